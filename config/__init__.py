@@ -1,0 +1,1 @@
+"""Schema, defaults and errors: what every other package may import."""

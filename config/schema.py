@@ -1,0 +1,127 @@
+"""Every knob of lacuna with its unit, range and default, in one place.
+
+Units are in the names: ``_m``, ``_deg``, ``_m_s``, ``_s``.  Angles are degrees here because people write this file;
+radians begin where the program reads it.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Quantity = Literal["heading", "depth", "altitude"]
+
+FRESH_WATER_KG_M3 = 997.0
+SEA_WATER_KG_M3 = 1025.0
+
+
+class Section(BaseModel):
+    """A part of the configuration: unknown keys are refused, values are frozen."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Site(Section):
+    """Where the dive is."""
+
+    name: str = Field("site", pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$", description="used in file names")
+    water: Literal["fresh", "sea"] | Annotated[float, Field(ge=900, le=1300)] = Field(
+        "fresh", description="fresh, sea, or a density in kg/m3"
+    )
+    height_m: float | None = Field(None, gt=0, le=100, description="floor to ceiling; absent: from the depths seen")
+    declination_deg: float = Field(0.0, ge=-180, le=180, description="added to magnetic headings, east positive")
+
+    @property
+    def density_kg_m3(self) -> float:
+        """Density of the water in kg/m3."""
+        if isinstance(self.water, float):
+            return self.water
+        return SEA_WATER_KG_M3 if self.water == "sea" else FRESH_WATER_KG_M3
+
+
+class Sonar(Section):
+    """The scanning sonar and how its head is set."""
+
+    driver: Literal["tritech"] = "tritech"
+    port: str = Field("/dev/ttyUSB0", min_length=1, description="any pyserial URL")
+    baud: int = Field(115200, ge=1200, le=4_000_000)
+    range_m: float = Field(10.0, ge=0.3, le=300)
+    bins: int = Field(400, ge=50, le=800, description="echo bins per ping")
+    step_deg: float = Field(1.8, ge=0.225, le=7.2, description="rounded to 1/16 gradian")
+    gain_pct: float = Field(50.0, ge=0, le=100)
+    sound_speed_m_s: float = Field(1481.0, ge=1350, le=1650)
+    head_type: Literal["dst", "non-dst"] = "dst"
+    node: int = Field(2, ge=1, le=254)
+    sector_deg: tuple[float, float] | None = Field(
+        None, description="left and right limit, clockwise from the bow; absent: full circle"
+    )
+    mount_deg: float = Field(0.0, ge=-180, le=180, description="head's ahead, clockwise from the bow")
+    inverted: bool = Field(False, description="the head hangs upside down")
+
+
+class Feed(Section):
+    """A line that tells heading or depth."""
+
+    name: str = Field("feed", pattern=r"^[a-z][a-z0-9_-]{0,31}$")
+    driver: Literal["nmea"] = "nmea"
+    port: str = Field("/dev/ttyUSB1", min_length=1, description="any pyserial URL")
+    baud: int = Field(4800, ge=300, le=4_000_000)
+    provides: tuple[Quantity, ...] = ("heading", "depth")
+    checksum: Literal["require", "warn", "ignore"] = "require"
+    dpt: Literal["vehicle_depth", "altitude"] = Field("vehicle_depth", description="what DPT and DBT sentences mean")
+
+
+class Map(Section):
+    """Scans, registration and the evidence grid."""
+
+    cell_m: float = Field(0.05, ge=0.02, le=0.25)
+    occupied_threshold: float = Field(0.75, ge=0.5, le=0.95, description="the paper's t, 0.65 to 0.85")
+    free_threshold: float = Field(0.35, ge=0.05, le=0.5)
+    beam_deg: float = Field(3.0, gt=0, le=20, description="horizontal width of the beam")
+    beam_vertical_deg: float = Field(35.0, gt=0, le=90, description="vertical width of the beam")
+    range_offset_m: float = Field(0.0, ge=-0.5, le=0.5, description="added to every range")
+    min_range_m: float = Field(0.3, ge=0, le=5)
+    particles: int = Field(1000, ge=50, le=20_000)
+    compass_sd_deg: float = Field(4.0, gt=0, le=45)
+    reach_m: float = Field(3.0, gt=0, le=20, description="how far a pilot moves between two stations")
+    heading_deg: float | None = Field(None, ge=0, lt=360, description="a constant heading, where no feed tells one")
+    seed: int = Field(1, ge=0)
+
+
+class Fill(Section):
+    """Filling of holes."""
+
+    method: Literal["chord", "paper"] = "chord"
+    max_gap_m: float = Field(2.0, gt=0, le=20)
+    seed: int = Field(1, ge=0)
+
+
+class Publish(Section):
+    """What listens, and where."""
+
+    bind: str = Field("tcp://127.0.0.1", pattern=r"^tcp://\S+$", description="address without port")
+    port: int = Field(5556, ge=1, le=65535, description="snapshots")
+    request_port: int = Field(5557, ge=1, le=65535)
+    keys: str | None = Field(None, description="folder of CURVE keys; needed for any address but loopback")
+
+
+class Recording(Section):
+    """Where logs go."""
+
+    folder: str = Field("logs", min_length=1)
+    segment_mib: float = Field(64.0, gt=0, le=4096)
+    segment_min: float = Field(10.0, gt=0, le=1440)
+    disk_low_mib: float = Field(500.0, ge=0, description="free space below which health warns")
+
+
+class Config(Section):
+    """The whole configuration, as read from TOML and as kept in every log."""
+
+    site: Site = Site()
+    sonar: Sonar = Sonar()
+    feed: tuple[Feed, ...] = ()
+    map: Map = Map()
+    fill: Fill = Fill()
+    publish: Publish = Publish()
+    recording: Recording = Recording()

@@ -1,0 +1,1 @@
+"""The running program: acquisition, the mapping pipeline, publication."""

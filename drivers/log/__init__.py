@@ -1,0 +1,1 @@
+"""Logs: MCAP files that hold every byte received or sent."""

@@ -1,0 +1,1 @@
+"""Codec and state machine of Tritech heads that speak the Seanet serial protocol."""

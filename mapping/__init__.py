@@ -1,0 +1,1 @@
+"""From readings to stationary scans, station poses and the evidence grid."""

@@ -1,0 +1,1 @@
+"""What people start: commands, importers, exports, the emulator, the dashboard."""

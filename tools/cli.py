@@ -1,0 +1,83 @@
+"""The command line: a table of commands, each in a module of its own that is imported when it is asked for."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import os
+import sys
+from typing import Final, Protocol, cast
+
+from config.errors import LacunaError, UsageError
+
+COMMANDS: Final[dict[str, tuple[str, str]]] = {}
+"""Name of each command, its module, and what it does in one line."""
+
+
+class Command(Protocol):
+    """What a command's module offers."""
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Declare the command's options."""
+
+    def run(self, args: argparse.Namespace) -> int:
+        """Do the work; return the exit code."""
+
+
+class Parser(argparse.ArgumentParser):
+    """An argument parser that ends wrong usage with exit code 64 and one line."""
+
+    def error(self, message: str) -> None:  # type: ignore[override]
+        """Raise the usage error that ``main`` prints."""
+        raise UsageError(f"{message}; see '{self.prog} --help'")
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run ``lacuna COMMAND ...`` and return its exit code (design section 5: codes after sysexits.h)."""
+    words = sys.argv[1:] if argv is None else argv
+    try:
+        return _dispatch(words)
+    except LacunaError as error:
+        print(f"lacuna: {error}", file=sys.stderr)
+        return error.exit_code
+    except KeyboardInterrupt:
+        return 130
+    except BrokenPipeError:
+        # The reader of our output has gone (`lacuna info LOG | head`): nothing is left to say.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+
+
+def _dispatch(words: list[str]) -> int:
+    name = words[0] if words and words[0] in COMMANDS else None
+    parser = _parser(name)
+    args = parser.parse_args(words)
+    if name is None:
+        parser.print_help()
+        return 0 if not words else UsageError.exit_code
+    return _command(name).run(args)
+
+
+def _parser(name: str | None) -> Parser:
+    parser = Parser(prog="lacuna", description="Maps flooded places and says how sure it is.")
+    parser.add_argument("--version", action="version", version=f"lacuna {_version()}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", parser_class=Parser)
+    for each, (_, line) in COMMANDS.items():
+        child = commands.add_parser(each, help=line, description=line)
+        if each == name:
+            _command(each).add_arguments(child)
+    return parser
+
+
+def _command(name: str) -> Command:
+    return cast("Command", importlib.import_module(COMMANDS[name][0]))
+
+
+def _version() -> str:
+    from importlib.metadata import version
+
+    return version("lacuna")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

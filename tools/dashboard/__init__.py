@@ -1,0 +1,1 @@
+"""The live page: a bridge from ZeroMQ to the browser."""

@@ -1,0 +1,1 @@
+"""An emulated vehicle with its sonar, compass and depth sensor in an emulated site."""
