@@ -10,7 +10,9 @@ from typing import Final, Protocol, cast
 
 from config.errors import LacunaError, UsageError
 
-COMMANDS: Final[dict[str, tuple[str, str]]] = {}
+COMMANDS: Final[dict[str, tuple[str, str]]] = {
+    "check-config": ("tools.check_config", "say every mistake of a configuration file"),
+}
 """Name of each command, its module, and what it does in one line."""
 
 

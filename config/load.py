@@ -1,0 +1,104 @@
+"""Read a configuration file: every mistake at once, each with its key, what it got and what it expected."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from pydantic import ValidationError
+
+from config.checks import check
+from config.errors import ConfigError, InputError
+from config.expected import expected, nearest
+from config.schema import Config
+
+DEFAULT: Final = Path(__file__).with_name("default.toml")
+
+
+@dataclass(frozen=True, slots=True)
+class Mistake:
+    """One mistake: ``key`` with dots (``feed[0].baud``), ``got`` as text, ``expected`` as text, ``hint`` or empty."""
+
+    file: str
+    key: str
+    got: str
+    expected: str
+    hint: str = ""
+
+    def __str__(self) -> str:
+        """Return the line that the operator reads."""
+        where = f"{self.file}: {self.key}" if self.key else self.file
+        return f"{where}: got {self.got}, expected {self.expected}" + (f"; {self.hint}" if self.hint else "")
+
+
+def load_config(path: Path | None) -> Config:
+    """Return the configuration of ``path`` (None: the defaults that ship with lacuna).
+
+    Raises InputError where the file cannot be read and ConfigError, one line a mistake, where it is wrong.
+    """
+    config, mistakes = read_config(path or DEFAULT)
+    if config is None or mistakes:
+        raise ConfigError("\n".join(str(each) for each in mistakes))
+    return config
+
+
+def read_config(path: Path) -> tuple[Config | None, list[Mistake]]:
+    """Return the configuration and its mistakes; it is None where the mistakes leave nothing to return."""
+    try:
+        raw = tomllib.loads(path.read_bytes().decode("utf-8"))
+    except OSError as error:
+        raise InputError(f"cannot read {path}: {error.strerror}; name a configuration file that exists") from None
+    except UnicodeDecodeError as error:
+        return None, [Mistake(str(path), "", f"a byte that is not UTF-8 at {error.start}", "UTF-8 text")]
+    except tomllib.TOMLDecodeError as error:
+        return None, [Mistake(str(path), "", f"broken TOML ({error})", "key = value lines under [section] lines")]
+    return _validated(str(path), raw)
+
+
+def _validated(file: str, raw: dict[str, Any]) -> tuple[Config | None, list[Mistake]]:
+    try:
+        config = Config.model_validate(raw)
+    except ValidationError as error:
+        return None, _from_pydantic(file, raw, error)
+    found = [Mistake(file, each.key, each.got, each.expected, each.hint) for each in check(config)]
+    return (None if found else config), found
+
+
+def _from_pydantic(file: str, raw: dict[str, Any], error: ValidationError) -> list[Mistake]:
+    """One mistake a key: the branches of a union, told apart by pydantic, are one mistake to a person."""
+    mistakes: dict[str, Mistake] = {}
+    for each in error.errors(include_url=False):
+        place, value = _resolve(raw, each["loc"])
+        key = _dotted(place)
+        if each["type"] == "extra_forbidden":
+            offered, hint = nearest(place)
+            mistakes[key] = Mistake(file, key, "an unknown key", offered, hint)
+        else:
+            mistakes.setdefault(key, Mistake(file, key, _shown(value), expected(place)))
+    return list(mistakes.values())
+
+
+def _resolve(raw: dict[str, Any], loc: tuple[int | str, ...]) -> tuple[tuple[int | str, ...], Any]:
+    """Return the part of ``loc`` that stands in the file (pydantic appends branch names) and its value."""
+    value: Any = raw
+    place: list[int | str] = []
+    for step in loc:
+        inside = (isinstance(value, dict) and step in value) or (
+            isinstance(value, list) and isinstance(step, int) and step < len(value)
+        )
+        if not inside:
+            break
+        value = value[step]
+        place.append(step)
+    return tuple(place), value
+
+
+def _dotted(place: tuple[int | str, ...]) -> str:
+    return "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in place).lstrip(".")
+
+
+def _shown(value: object) -> str:
+    text = repr(value).lower() if isinstance(value, bool) else repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
