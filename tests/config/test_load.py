@@ -13,7 +13,6 @@ from config.load import DEFAULT, load_config, read_config
 from config.schema import Config, Feed
 from tools.cli import main
 
-
 Write = Callable[[str], Path]
 
 
