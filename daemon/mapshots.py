@@ -52,7 +52,7 @@ def grid_delta(stamp: Stamp, grid: Grid, before: NDArray[np.uint8]) -> Snapshot 
 
 
 def fill(stamp: Stamp, filled: Filled) -> Snapshot:
-    """Return n filled cells: arrays ``row`` i4, ``col`` i4, ``certainty`` u1 (255: sure), ``hole`` i4, each ``(n,)``."""
+    """Return n filled cells: arrays ``row`` i4, ``col`` i4, ``certainty`` u1 (255: sure), ``hole`` i4, all ``(n,)``."""
     row, col = np.nonzero(filled.hole >= 0)
     certainty = np.rint(255.0 * filled.certainty[row, col]).astype(np.uint8)
     fields: dict[str, Json] = {

@@ -29,7 +29,7 @@ class Snapshot:
 
 
 def ping(reading: Ping, utc_ns: int, heading_rad: float | None, depth_m: float | None) -> Snapshot:
-    """Return one beam: array ``echoes`` ``(n_bins,)`` u1; ``heading_deg`` and ``depth_m`` are the newest told, or null."""
+    """Return one beam: array ``echoes`` ``(n_bins,)`` u1; ``heading_deg`` and ``depth_m`` as told last, or null."""
     fields: dict[str, Json] = {
         "bearing_deg": degrees(reading.bearing_rad),
         "heading_deg": None if heading_rad is None else degrees(heading_rad),
