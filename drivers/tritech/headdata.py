@@ -40,8 +40,11 @@ class Control(IntFlag):
     IGNORE_SENSOR = 0x8000
 
 
-USUAL_CONTROL: Final = Control.ADC_8_ON | Control.RAW | Control.HAS_MOTOR | Control.REPLY_ASL | Control.SCAN_RIGHT
-"""8-bit echoes, a sector scanned clockwise, and the bits that are always set."""
+USUAL_CONTROL: Final = Control(0x230D)
+"""8-bit echoes, a sector scanned clockwise, and the bits that Tritech's software always sets.
+
+One of these is INVERT: with it, bearings grow clockwise in every recording made with that software.
+"""
 
 
 class HeadStatus(IntFlag):

@@ -23,8 +23,8 @@ _KEPT: Final = Control.ADC_8_ON | Control.CONTINUOUS | Control.INVERT
 def head_command(sonar: Sonar) -> HeadCommand:
     """Head command that sets a head as configured.
 
-    The head is never told that it hangs upside down (`Control.INVERT`): the names of that bit contradict each other
-    in the manuals, so `drivers.tritech.decoder` mirrors the angles instead, and the sector here.
+    The head is not told that it hangs upside down: what its INVERT bit means is described in contradicting ways, so
+    that bit stays as Tritech's software sets it, and `bow_angle_rad` mirrors the angles, the sector's limits included.
     """
     interval, bins = units.sampling(sonar.range_m, sonar.bins, sonar.sound_speed_m_s)
     left, right = _limits(sonar)

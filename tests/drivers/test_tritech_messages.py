@@ -221,9 +221,9 @@ def test_head_command_of_the_configuration() -> None:
     parameters = command.parameters
     assert (parameters.left_limit, parameters.right_limit, parameters.step) == (1600, 4000, 16)
     assert (parameters.bins, parameters.ad_interval, parameters.gain_1, parameters.head_type) == (400, 53, 105, 0x11)
-    assert (int(parameters.control), parameters.range_scale, parameters.pulse_us) == (0x2305, 100, 50)
+    assert (int(parameters.control), parameters.range_scale, parameters.pulse_us) == (0x230D, 100, 50)
     assert len(commands.encode_command(command)) == 66
-    assert int(head_command(Sonar()).parameters.control) == 0x2307
+    assert int(head_command(Sonar()).parameters.control) == 0x230F
     old = head_command(Sonar(head_type="non-dst")).parameters
     assert (old.head_type, old.transmit_1, old.receive_2) == (2, 0x02999999, 0x090A3D70)
 
