@@ -1,0 +1,113 @@
+// Ports, lag, disk and events. Fields that this page does not know are shown as they come.
+
+const GOOD = new Set(["open", "ok", "live", "running", "receiving", "scanning", "up"]);
+const BAD = new Set(["lost", "closed", "error", "absent", "failed", "dead", "down"]);
+const SILENT_S = 3;
+const EVENTS_KEPT = 200;
+const LAG_SLOW_S = 5;
+const DISK_LOW_MIB = 500;
+
+const element = (tag, className, text) => {
+  const node = document.createElement(tag);
+  if (className) node.className = className;
+  if (text !== undefined) node.textContent = text;
+  return node;
+};
+
+/** Lamp and word of a port: the word says what the colour says. */
+export function judge(port) {
+  const state = String(port.state ?? "unknown");
+  if (BAD.has(state)) return { lamp: "red", word: state };
+  if (Number.isFinite(port.last_s) && port.last_s > SILENT_S) return { lamp: "yellow", word: `silent for ${duration(port.last_s)}` };
+  return { lamp: GOOD.has(state) ? "green" : "yellow", word: state };
+}
+
+export function duration(seconds) {
+  if (seconds < 10) return `${seconds.toFixed(1)} s`;
+  if (seconds < 120) return `${seconds.toFixed(0)} s`;
+  return seconds < 7200 ? `${(seconds / 60).toFixed(0)} min` : `${(seconds / 3600).toFixed(0)} h`;
+}
+
+function number(value) {
+  if (typeof value !== "number" || Number.isInteger(value)) return String(value);
+  return Math.abs(value) >= 100 ? value.toFixed(0) : String(+value.toPrecision(3));
+}
+
+/** `rx_bytes_s: 3120` as "3120 rx bytes/s": units stand at the end of the names. */
+export function phrase(name, value) {
+  const shown = number(value);
+  const unit = /_(s|m|deg|mib|pct)$/.exec(name)?.[1];
+  if (/(bytes|pings|readings|frames|messages)_s$/.test(name)) return `${shown} ${name.slice(0, -2).replaceAll("_", " ")}/s`;
+  if (!unit) return `${name.replaceAll("_", " ")} ${shown}`;
+  return `${name.slice(0, -unit.length - 1).replaceAll("_", " ")} ${shown} ${{ deg: "°", mib: "MiB", pct: "%" }[unit] ?? unit}`;
+}
+
+export class Health {
+  constructor(find) {
+    this.find = find;
+    this.clear();
+  }
+
+  clear() {
+    this.find("ports").replaceChildren(element("li", "empty", "Nothing heard of the ports yet."));
+    this.find("facts").replaceChildren();
+    this.find("events").replaceChildren();
+    for (const name of ["lag", "disk"]) this.find(name).textContent = "";
+  }
+
+  push(header) {
+    const ports = Object.entries(header.ports ?? {});
+    this.find("ports").replaceChildren(...ports.map(([name, port]) => portItem(name, port)));
+    this.headline(header);
+    const facts = flatten(header).filter(([name]) => !name.startsWith("ports ") && !HEADER.has(name));
+    this.find("facts").replaceChildren(...facts.flatMap(([name, value]) => [element("dt", "", name), element("dd", "", number(value))]));
+  }
+
+  headline(header) {
+    const lag = header.map?.lag_s;
+    const free = header.disk_free_mib;
+    this.find("lag").textContent = Number.isFinite(lag) ? `map ${lag < LAG_SLOW_S ? "" : "late, "}${duration(lag)} behind` : "";
+    if (!Number.isFinite(free)) return;
+    const size = free >= 1024 ? `${(free / 1024).toFixed(1)} GiB` : `${free.toFixed(0)} MiB`;
+    this.find("disk").textContent = `${free < DISK_LOW_MIB ? "disk low, " : ""}${size} free`;
+  }
+
+  event(header) {
+    const list = this.find("events");
+    const item = element("li");
+    const time = element("time", "", clock(header.utc_ns));
+    item.append(time, element("span", "", eventText(header)));
+    list.prepend(item);
+    while (list.children.length > EVENTS_KEPT) list.lastChild.remove();
+  }
+}
+
+const HEADER = new Set(["v", "seq", "session", "t_ns", "utc_ns", "topic", "arrays"]);
+
+function portItem(name, port) {
+  const { lamp, word } = judge(port);
+  const item = element("li");
+  item.dataset.lamp = lamp;
+  item.dataset.port = name;
+  const details = Object.entries(port).filter(([key, value]) => key !== "state" && value !== null && typeof value !== "object");
+  item.append(element("i", "lamp"), element("span", "name", name), element("span", "word", word));
+  item.append(element("span", "detail", details.map(([key, value]) => phrase(key, value)).join("  ·  ")));
+  return item;
+}
+
+function flatten(value, prefix = "") {
+  return Object.entries(value).flatMap(([key, each]) => {
+    const name = prefix ? `${prefix} ${key}` : key;
+    if (each !== null && typeof each === "object") return flatten(each, name);
+    return [[name.replaceAll("_", " "), each ?? "–"]];
+  });
+}
+
+function clock(utcNs) {
+  return Number.isFinite(utcNs) ? new Date(utcNs / 1e6).toLocaleTimeString([], { hour12: false }) : "";
+}
+
+function eventText(header) {
+  const fields = Object.entries(header.fields ?? {}).map(([key, value]) => (key === "text" ? value : `${key.replaceAll("_", " ")} ${typeof value === "object" ? JSON.stringify(value) : number(value)}`));
+  return [String(header.kind ?? "event").replaceAll("_", " "), ...fields].join(", ");
+}
