@@ -26,6 +26,7 @@ class Follower:
         self._number = 0
         self._file: BinaryIO | None = None
         self._path = folder
+        self._is_closed = False
         self.damage = Damage()
         """What could not be read so far."""
         self._scanner = Scanner(self.damage)
@@ -36,14 +37,14 @@ class Follower:
 
         Raises DataError where a newer version writes the log, LogError where the disk fails.
         """
-        while self._file is not None or self._open_next():
+        while not self._is_closed and (self._file is not None or self._open_next()):
             # Asked before reading: bytes written before the name changed are then surely read.
             is_final = self._is_final()
             data = self._read()
             found = self._scanner.push(data) if data else self._scanner.finish() if is_final else iter(())
             records = [record for block in found for record in self._take(block)]
             if not data and is_final:
-                self.close()
+                self._release()
             if records:
                 return records
             if not data and not is_final:
@@ -51,7 +52,17 @@ class Follower:
         return []
 
     def close(self) -> None:
-        """Let go of the open segment."""
+        """Let go of the open segment; ``poll`` gives nothing more."""
+        self._is_closed = True
+        self._release()
+
+    def __enter__(self) -> Follower:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _release(self) -> None:
         if self._file is not None:
             self._file.close()
         self._file = None

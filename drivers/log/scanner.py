@@ -22,7 +22,7 @@ from mcap.records import Channel, Metadata
 
 from drivers.log.header import is_intact
 from drivers.log.layout import RECORD_LIMIT, record_of
-from drivers.log.segment import MAGIC
+from drivers.log.segment import MAGIC, packed
 from drivers.records import Record
 
 BLOCK_LIMIT: Final = RECORD_LIMIT + (64 << 10)
@@ -200,8 +200,9 @@ def _block(data: bytes) -> Block | None:
 
 
 def _metadata(data: bytes) -> dict[str, str] | None:
-    metadata = Metadata.read(_stream(data)).metadata
-    return metadata if is_intact(metadata) else None
+    record = Metadata.read(_stream(data))
+    # Written again, it must be the same bytes: a damaged length would otherwise reach over the chunks behind it.
+    return record.metadata if packed([record]) == data and is_intact(record.metadata) else None
 
 
 def _entries(data: bytes) -> list[Entry] | None:

@@ -118,6 +118,12 @@ class LogWriter:
             self._drop_buffer()
         self._end()
 
+    def __enter__(self) -> LogWriter:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
     def _start(self) -> None:
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
@@ -134,7 +140,7 @@ class LogWriter:
             self._segment = Segment(path, header.metadata())
         except OSError as error:
             raise self._refused(error) from error
-        self._next, self._previous, self._begun_t_ns = self._next + 1, path.name, None
+        self._next, self._previous = self._next + 1, path.name
         return self._segment
 
     def _make_room(self, message: Message, t_ns: int) -> None:
@@ -159,15 +165,15 @@ class LogWriter:
         self._buffer.add(channel, message)
 
     def _is_segment_full(self, t_ns: int) -> bool:
-        if self._segment is None or self._begun_t_ns is None:
+        if self._begun_t_ns is None:
             return False
         limits = self._header.config.recording
-        too_long = t_ns - self._begun_t_ns >= limits.segment_min * _MINUTE_NS
-        return too_long or self._segment.size + self._buffer.size >= limits.segment_mib * _MIB
+        size = self._buffer.size + (self._segment.size if self._segment is not None else 0)
+        return t_ns - self._begun_t_ns >= limits.segment_min * _MINUTE_NS or size >= limits.segment_mib * _MIB
 
     def _end(self) -> None:
         segment, self._segment = self._segment, None
-        self._unsynced_t_ns = None
+        self._begun_t_ns = self._unsynced_t_ns = None
         if segment is None:
             return
         try:
@@ -182,7 +188,7 @@ class LogWriter:
         if self._segment is not None:
             self._segment.abandon()
         self._segment = None
-        self._unsynced_t_ns = None
+        self._unsynced_t_ns, self._begun_t_ns = None, self._oldest_t_ns
 
     def _drop_buffer(self) -> None:
         self.lost_records += len(self._buffer.messages)
