@@ -11,6 +11,7 @@ from typing import Final, Protocol, cast
 from config.errors import LacunaError, UsageError
 
 COMMANDS: Final[dict[str, tuple[str, str]]] = {
+    "emulate": ("tools.emulate", "an emulated vehicle on two pseudo-terminals, or recorded to a file"),
     "dashboard": ("tools.dashboard_command", "the live page in a browser"),
     "check-config": ("tools.check_config", "say every mistake of a configuration file"),
 }

@@ -1,0 +1,92 @@
+"""A dive without clocks or ports: vehicle, head, feed and echoes, moved on by the times that it is given."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from math import tau
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.tritech.units import TURN
+from tools.emulator.echoes import EchoModel, Place, Sampling
+from tools.emulator.feeds import FeedOptions, NmeaFeed
+from tools.emulator.head import Head, HeadOptions, Sounding
+from tools.emulator.site import Site
+from tools.emulator.vehicle import Vehicle, VehicleOptions
+
+SECOND_NS: Final = 1_000_000_000
+TRACK_NS: Final = 100_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class DiveOptions:
+    """What may differ from dive to dive; ``stations`` limits the stops, ``sound_speed_m_s`` is the water's own."""
+
+    stations: int | None = None
+    sound_speed_m_s: float = 1481.0
+    head: HeadOptions = field(default_factory=HeadOptions)
+    feed: FeedOptions = field(default_factory=FeedOptions)
+    vehicle: VehicleOptions = field(default_factory=VehicleOptions)
+
+
+@dataclass(frozen=True, slots=True)
+class Track:
+    """A place of the true trajectory."""
+
+    t_ns: int
+    place: Place
+
+
+class Dive:
+    """The emulated vehicle: bytes of the host in, bytes of both lines out; never looks at a clock.
+
+    The vehicle rests at its first stop until the host asks for data, so that a slow start loses nothing.
+    """
+
+    def __init__(self, site: Site, seed: int, options: DiveOptions | None = None) -> None:
+        self.options = options or DiveOptions()
+        self.site = replace(site, stops=site.stops[: self.options.stations])
+        self.seed = seed
+        self.track: list[Track] = []
+        rng = np.random.default_rng((seed, 0xD1FE))
+        self.vehicle = Vehicle(self.site.stops, self.options.vehicle, phase=float(rng.uniform(0.0, tau)))
+        self.head = Head(self._listen, self.options.head)
+        self._echoes = EchoModel(self.site, seed)
+        self._feed = NmeaFeed(self.vehicle.place_at, rng, self.options.feed)
+        self._swept = 0.0
+        self._next_track_ns = 0
+
+    @property
+    def done(self) -> bool:
+        """Whether the last stop's rest was long enough."""
+        return self.vehicle.done
+
+    def push(self, t_ns: int, data: bytes) -> None:
+        """Take bytes that the host sent to the sonar."""
+        self.head.push(t_ns, data)
+
+    def tick(self, t_ns: int) -> tuple[bytes, bytes]:
+        """Move on to ``t_ns`` and return what the sonar's and the feed's lines have delivered since the last call."""
+        sonar = self.head.tick(t_ns)
+        feed = self._feed.tick(t_ns)
+        if self.vehicle.started and t_ns >= self._next_track_ns:
+            self.track.append(Track(t_ns, self.vehicle.place_at(t_ns)))
+            self._next_track_ns = t_ns + TRACK_NS
+        return sonar, feed
+
+    def advance(self, t_ns: int) -> bool:
+        """Let the vehicle start, leave or arrive; return whether a rest began or the dive is done."""
+        if not self.vehicle.started and self.head.pings:
+            self.vehicle.start(t_ns)
+            return True
+        return self.vehicle.advance(t_ns, self.head.pings, self._swept)
+
+    def _listen(self, sounding: Sounding) -> NDArray[np.uint8]:
+        place = self.vehicle.place_at(sounding.t_ns)
+        bin_m = self.options.sound_speed_m_s * sounding.interval_ns * 1e-9 / 2.0
+        settings = self.head.settings
+        self._swept += (settings.step if settings else 0) * tau / TURN
+        sampling = Sampling(bin_m, sounding.bins, sounding.gain_db)
+        return self._echoes.ping(place, sounding.bearing_rad, sampling, self.head.pings)

@@ -1,0 +1,73 @@
+"""Compass and depth sensor of the emulated vehicle, as NMEA 0183 sentences on one slow line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import reduce
+from math import cos, degrees, radians
+from typing import Literal
+
+import numpy as np
+
+from tools.emulator.echoes import Place
+from tools.emulator.line import Line
+
+SECOND_NS = 1_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class FeedOptions:
+    """How the sensors err.  The compass reads magnetic: true heading less declination, plus bias and deviation.
+
+    ``deviation_deg`` is the amplitude of a one-cycle deviation (hard iron), greatest at ``deviation_at_deg``.
+    """
+
+    baud: int = 4800
+    heading_hz: float = 10.0
+    depth_hz: float = 5.0
+    sentence: Literal["HDG", "HDM"] = "HDG"
+    heading_sd_deg: float = 0.3
+    bias_deg: float = 1.0
+    deviation_deg: float = 1.5
+    deviation_at_deg: float = 60.0
+    declination_deg: float = 0.0
+    depth_sd_m: float = 0.01
+
+
+class NmeaFeed:
+    """Sentences of a compass (HDG or HDM) and a depth sensor (DPT: the vehicle's depth), paced by their line."""
+
+    def __init__(self, where: Callable[[int], Place], rng: np.random.Generator, options: FeedOptions) -> None:
+        self._where = where
+        self._rng = rng
+        self._options = options
+        self._line = Line(options.baud)
+        self._next_heading_ns = 0
+        self._next_depth_ns = int(SECOND_NS / options.heading_hz / 2)
+
+    def tick(self, t_ns: int) -> bytes:
+        """Return the bytes that have come by ``t_ns`` since the last call."""
+        if t_ns >= self._next_heading_ns:
+            self._next_heading_ns = t_ns + int(SECOND_NS / self._options.heading_hz)
+            self._line.send(t_ns, self._heading(self._where(t_ns).heading_rad))
+        if t_ns >= self._next_depth_ns:
+            self._next_depth_ns = t_ns + int(SECOND_NS / self._options.depth_hz)
+            self._line.send(t_ns, self._depth(self._where(t_ns).depth_m))
+        return self._line.take(t_ns)
+
+    def _heading(self, heading_rad: float) -> bytes:
+        options = self._options
+        swing = options.deviation_deg * cos(heading_rad - radians(options.deviation_at_deg))
+        reading = degrees(heading_rad) - options.declination_deg + options.bias_deg + swing
+        reading = round((reading + options.heading_sd_deg * self._rng.standard_normal()) % 360.0, 1) % 360.0
+        return sentence(f"HCHDG,{reading:.1f},,,," if options.sentence == "HDG" else f"HCHDM,{reading:.1f},M")
+
+    def _depth(self, depth_m: float) -> bytes:
+        reading = max(0.0, depth_m + self._options.depth_sd_m * self._rng.standard_normal())
+        return sentence(f"SDDPT,{reading:.2f},0.0")
+
+
+def sentence(body: str) -> bytes:
+    """Return a whole NMEA sentence with its checksum."""
+    return f"${body}*{reduce(lambda total, byte: total ^ byte, body.encode(), 0):02X}\r\n".encode()
