@@ -13,7 +13,7 @@ from config.errors import LogError
 from config.schema import Config
 from drivers.log.header import LogHeader
 from drivers.log.names import segment_path, segments
-from drivers.log.segment import ChannelTable, ChunkBuffer, Segment
+from drivers.log.segment import PART, ChannelTable, ChunkBuffer, Segment
 from drivers.records import Record
 
 FLUSH_NS: Final = 200_000_000
@@ -35,9 +35,13 @@ class LogWriter:
     Where the disk refuses a write, LogError is raised, the segment is left as a readable ``.part``, and up to a chunk
     of records waits in memory; each later flush tries a new segment.  Records that had to be given up are counted in
     ``lost_records``, and their sequence numbers are missing in the log.
+
+    With ``resume`` a session whose writer died goes on in its next segment; without, a log of it must not exist.
     """
 
-    def __init__(self, folder: Path, session: str, config: Config, versions: dict[str, str]) -> None:
+    def __init__(
+        self, folder: Path, session: str, config: Config, versions: dict[str, str], *, resume: bool = False
+    ) -> None:
         self._folder = folder
         self._header = LogHeader(config, dict(versions), session)
         self._table = ChannelTable()
@@ -51,7 +55,12 @@ class LogWriter:
         self._previous: str | None = None
         self.lost_records = 0
         """Records that could not be written."""
-        self._start()
+        self._start(resume)
+
+    @property
+    def is_writing(self) -> bool:
+        """Whether a segment is open; it is not after the disk refused one, until a flush has begun the next."""
+        return self._segment is not None
 
     @property
     def path(self) -> Path:
@@ -124,13 +133,17 @@ class LogWriter:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _start(self) -> None:
+    def _start(self, resume: bool) -> None:
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise self._refused(error) from error
-        if segments(self._folder, self._header.session):
+        earlier = segments(self._folder, self._header.session)
+        if earlier and not resume:
             raise LogError(f"a log of session {self._header.session} exists in {self._folder}; choose another session")
+        if earlier:
+            self._next, newest = max(earlier.items())
+            self._next, self._previous = self._next + 1, newest.name.removesuffix(PART)
         self._open()
 
     def _open(self) -> Segment:

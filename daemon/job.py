@@ -1,0 +1,48 @@
+"""What the supervisor tells a child when it starts it: one line of JSON on the child's standard input.
+
+The input stays open for as long as the supervisor lives; its end tells the child that it is alone.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from config.schema import Config
+from daemon.clock import Clock
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """``link`` is the supervisor's socket; ``is_first`` is false for a child that takes over from one that died."""
+
+    link: str
+    session: str
+    config: Config
+    clock: Clock
+    is_first: bool
+
+    @property
+    def folder(self) -> Path:
+        """Folder of the session's log."""
+        return Path(self.config.recording.folder)
+
+    def line(self) -> bytes:
+        """Return the job as a line."""
+        body = {
+            "link": self.link,
+            "session": self.session,
+            "config": self.config.model_dump(mode="json"),
+            "rate": self.clock.rate,
+            "origin_ns": list(self.clock.origin_ns),
+            "is_first": self.is_first,
+        }
+        return json.dumps(body).encode() + b"\n"
+
+
+def read_job(line: bytes) -> Job:
+    """Return the job in ``line``."""
+    body = json.loads(line)
+    clock = Clock(body["rate"], tuple(body["origin_ns"]))
+    return Job(body["link"], body["session"], Config.model_validate(body["config"]), clock, body["is_first"])
