@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import socket
 import webbrowser
+from pathlib import Path
 from urllib.parse import quote
 
 from config.checks import is_loopback
@@ -28,7 +29,7 @@ def run(args: argparse.Namespace) -> int:
     """Serve the page until Ctrl-C."""
     try:
         from tools.dashboard.access import Access
-        from tools.dashboard.peer import Peer
+        from tools.dashboard.peer import Peer, curve_from
         from tools.dashboard.server import application, serve
     except ModuleNotFoundError as error:
         if (error.name or "").split(".")[0] not in _LAPTOP:
@@ -38,7 +39,9 @@ def run(args: argparse.Namespace) -> int:
         raise ConfigError(f"{args.host} can be reached from other machines: give --token WORD, or leave --host away")
     if args.token is not None and len(args.token) < 8:
         raise UsageError("the token is too short: take 8 characters or more")
-    peer = Peer(args.connect, args.requests)
+    keys = curve_from(Path(args.keys).expanduser()) if args.keys is not None else None
+    peer = Peer(args.connect, args.requests, keys)
+    peer.check()
     with listen(args.host, args.port) as listener:
         address = url(args.host, listener.getsockname()[1], args.token)
         print(f"dashboard: {address}", flush=True)

@@ -180,8 +180,7 @@ def _scan(index: int) -> Scan:
 def health(t_ns: int, sonar_state: str = "open") -> Snapshot:
     """Two ports, one of which is silent; a map that is a little late."""
     ports: dict[str, Any] = {
-        "sonar": {"state": "open", "rx_bytes_s": 8120.0, "pings_s": 39.8, "last_s": 0.02, "lost": 0, "skipped": 3}
-        | sonar,
+        "sonar": {"state": "open", "rx_bytes_s": 8120.0, "pings_s": 39.8, "last_s": 0.02, "lost": 0, "skipped": 3},
         "pilot": {"state": "open", "rx_bytes_s": 0.0, "readings_s": 0.0, "last_s": 41.0, "lost": 1, "skipped": 0},
     }
     fields: dict[str, Any] = {"ports": ports, "map": {"lag_s": 0.4, "records": 12804}, "disk_free_mib": 21480.0}

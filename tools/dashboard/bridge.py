@@ -7,6 +7,7 @@ slow browser so hears less often, but never old news, and slows nobody.
 from __future__ import annotations
 
 import asyncio
+import json
 import time
 from dataclasses import dataclass
 from typing import Final
@@ -76,10 +77,12 @@ class Bridge:
     def _receive(self, frames: list[bytes], socket: zmq.asyncio.Socket) -> None:
         try:
             message = wire.decode(frames)
+            # A browser's JSON knows neither NaN nor infinity: such a message would end its connection.
+            json.dumps(message.snapshot.fields, allow_nan=False)
         except DataError as error:
             self._refused = str(error)
             return
-        except FrameError:
+        except (FrameError, ValueError):
             self._damaged += 1
             return
         self._heard_s, self._refused = time.monotonic(), None

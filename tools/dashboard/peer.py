@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Final
 
 import zmq
 import zmq.asyncio
+import zmq.auth
 
+from config.errors import ConfigError, UsageError
 from daemon import wire
 
 ANSWER_S: Final = 3.0
@@ -25,6 +28,21 @@ class Curve:
     server: bytes
 
 
+def curve_from(folder: Path) -> Curve:
+    """Return the keys in ``folder``: ours in ``client.key_secret``, the daemon's in ``server.key``.
+
+    Raises ConfigError where a file is missing or is no certificate.
+    """
+    try:
+        public, secret = zmq.auth.load_certificate(folder / "client.key_secret")
+        server, _ = zmq.auth.load_certificate(folder / "server.key")
+    except (OSError, ValueError) as error:
+        raise ConfigError(f"cannot read the keys in {folder} ({error}); make them with 'lacuna keygen'") from None
+    if secret is None:
+        raise ConfigError(f"{folder / 'client.key_secret'} holds no secret key; make it anew with 'lacuna keygen'")
+    return Curve(public, secret, server)
+
+
 @dataclass(frozen=True, slots=True)
 class Peer:
     """Addresses of the daemon's snapshots (XPUB) and requests (ROUTER)."""
@@ -32,6 +50,18 @@ class Peer:
     snapshots: str
     requests: str
     curve: Curve | None = None
+
+    def check(self) -> None:
+        """Raise UsageError where an address is none."""
+        with zmq.Context() as context, context.socket(zmq.SUB) as socket:
+            socket.setsockopt(zmq.LINGER, 0)
+            for address in (self.snapshots, self.requests):
+                try:
+                    socket.connect(address)
+                except zmq.ZMQError as error:
+                    raise UsageError(
+                        f"'{address}' is no address ({error}); give one like tcp://127.0.0.1:5556"
+                    ) from None
 
     def context(self) -> zmq.asyncio.Context:
         """Return a context for one event loop."""

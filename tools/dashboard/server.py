@@ -89,14 +89,19 @@ async def _live(websocket: WebSocket, bridge: Bridge) -> None:
         await websocket.close(1013, "too many pages are open")
         return
     browser = bridge.join()
-    sending = asyncio.create_task(_send(websocket, browser))
+    both = [asyncio.create_task(each) for each in (_send(websocket, browser), _until_gone(websocket))]
     try:
-        while (await websocket.receive())["type"] != "websocket.disconnect":
-            pass  # the page says nothing here; its requests come as POST
+        await asyncio.wait(both, return_when=asyncio.FIRST_COMPLETED)
     finally:
-        sending.cancel()
-        await asyncio.wait([sending])
         bridge.leave(browser)
+        for each in both:
+            each.cancel()
+        await asyncio.gather(*both, return_exceptions=True)
+
+
+async def _until_gone(websocket: WebSocket) -> None:
+    while (await websocket.receive())["type"] != "websocket.disconnect":
+        pass  # the page says nothing here; its requests come as POST
 
 
 async def _send(websocket: WebSocket, browser: Browser) -> None:

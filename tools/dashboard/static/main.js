@@ -30,13 +30,18 @@ const TOPICS = {
 };
 
 function receive(message) {
-  if (message.topic === "bridge") { page.bridge = message.header; showLink(); return; }
+  if (message.topic === "bridge") { hearBridge(message.header); return; }
   const { session } = message.header;
   if (page.session !== null && session !== page.session) clear();
   page.session = session;
-  page.heard = performance.now() - (message.header.age_ms ?? 0);
   find("session").textContent = session ? `session ${String(session).slice(0, 8)}` : "";
   TOPICS[message.topic]?.(message);
+}
+
+/** The bridge tells every second how long the daemon has been silent: what it kept for a late page is not news. */
+function hearBridge(header) {
+  page.bridge = header;
+  page.heard = header.silent_s === null ? null : performance.now() - header.silent_s * 1000;
   showLink();
 }
 

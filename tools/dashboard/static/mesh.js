@@ -5,10 +5,12 @@ import { along, rgb } from "./palette.js";
 export const MEASURED = 0;
 export const FILLED = 1;
 export const ASSUMED = 2;
-const STONE = "#aebcc6";
-const FLOOR = "#3b5166";
-const CERTAINTY = ["#6b4a8c", "#c65b5e", "#f5a623"];
+const STONE = "#b2aa9e"; // the colours of mesh.ply
+const FLOOR = "#78909c";
+const CERTAINTY = ["#fad6aa", "#d55e00"];
+const SEAM = "#7a3600";
 const NAMES = ["wall, measured", "wall, filled in", "floor, assumed"];
+const MOST_SEAMS = 20000;
 const MIN_PAUSE_MS = 2500;
 const AXIS = { color: "#92a0ac", gridcolor: "#2b343d", zerolinecolor: "#3b4753", backgroundcolor: "#12171c", showbackground: true, title: { font: { size: 12 } } };
 
@@ -70,7 +72,8 @@ export class MeshView {
     const colours = Array.from(kind, (k, i) => colourOf(k, certainty[i] / 255));
     const texts = Array.from(kind, (k, i) => (k === FILLED ? `certainty ${((certainty[i] * 100) / 255).toFixed(0)} %` : NAMES[k]));
     const kinds = this.measuredOnly ? [MEASURED] : [MEASURED, FILLED, ASSUMED];
-    return kinds.map((wanted) => trace(wanted, places, pick(triangles, kind, wanted), colours, texts));
+    const surfaces = kinds.map((wanted) => trace(wanted, places, pick(triangles, kind, wanted), colours, texts));
+    return this.measuredOnly ? surfaces : [...surfaces, seams(places, pick(triangles, kind, FILLED))];
   }
 }
 
@@ -88,11 +91,22 @@ function pick(triangles, kind, wanted) {
 function trace(kind, [x, y, z], [i, j, k], vertexcolor, text) {
   return {
     type: "mesh3d", name: NAMES[kind], x, y, z, i, j, k, vertexcolor, text,
-    opacity: kind === MEASURED ? 1 : kind === FILLED ? 0.85 : 0.45,
+    opacity: kind === MEASURED ? 1 : kind === FILLED ? 0.9 : 0.45,
     flatshading: true,
     lighting: { ambient: 0.62, diffuse: 0.6, specular: 0.05, roughness: 0.9 },
     hovertemplate: "%{x:.2f} m east, %{y:.2f} m north, %{z:.2f} m deep<br>%{text}<extra></extra>",
   };
+}
+
+/** Edges of the filled triangles: what was filled in is told apart by more than its colour. */
+function seams([x, y, z], [i, j, k]) {
+  const line = { x: [], y: [], z: [] };
+  if (i.length > MOST_SEAMS) return { type: "scatter3d", mode: "lines", ...line };
+  for (let t = 0; t < i.length; t++) {
+    for (const v of [i[t], j[t], k[t], i[t]]) { line.x.push(x[v]); line.y.push(y[v]); line.z.push(z[v]); }
+    for (const axis of Object.values(line)) axis.push(null);
+  }
+  return { type: "scatter3d", mode: "lines", ...line, line: { color: SEAM, width: 1.5 }, hoverinfo: "skip" };
 }
 
 function colourOf(kind, certainty) {
@@ -119,7 +133,7 @@ function layout() {
       xaxis: axis("east, m"),
       yaxis: axis("north, m"),
       zaxis: { ...axis("depth, m"), autorange: "reversed" },
-      camera: { eye: { x: -0.9, y: -1.5, z: 1.1 } },
+      camera: { eye: { x: -1.1, y: -1.7, z: 1.35 }, center: { x: 0, y: 0, z: -0.15 } },
     },
   };
 }

@@ -180,7 +180,7 @@ function hatching(scale) {
   const n = Math.round(6 * scale);
   const tile = new OffscreenCanvas(n, n);
   const g = tile.getContext("2d");
-  g.strokeStyle = "#e8792b";
+  g.strokeStyle = "#d55e00";
   g.lineWidth = 2.4 * scale;
   g.beginPath();
   for (const shift of [-n, 0, n]) { g.moveTo(shift - n, n * 2); g.lineTo(shift + n * 2, -n); }

@@ -7,6 +7,7 @@ const FRESH_S = 20;
 const OLD_S = 90;
 const OLD_LIGHT = 0.38;
 const RING_STEPS = [0.25, 0.5, 1, 2, 5, 10, 20, 50, 100];
+const PAUSE_MS = 45; // an old laptop need not draw every beam
 const EMPTY = "#0b0f13";
 
 const radians = (degrees) => (degrees * Math.PI) / 180;
@@ -79,7 +80,7 @@ export class Polar {
   layOut() {
     const n = this.canvas.width;
     this.centre = n / 2;
-    this.radius = n / 2 - 18 * this.scale;
+    this.radius = n / 2 - 22 * this.scale;
     this.image = new ImageData(n, n);
     this.slotOf = new Int16Array(n * n).fill(-1);
     this.farOf = new Float32Array(n * n);
@@ -96,10 +97,12 @@ export class Polar {
   request() {
     if (this.waiting || !this.image) return;
     this.waiting = true;
-    requestAnimationFrame(() => { this.waiting = false; this.draw(); });
+    const wait = Math.max(0, PAUSE_MS - (performance.now() - (this.drawnAt ?? 0)));
+    setTimeout(() => requestAnimationFrame(() => { this.waiting = false; this.draw(); }), wait);
   }
 
   draw() {
+    this.drawnAt = performance.now();
     this.paintEchoes();
     const g = this.canvas.getContext("2d");
     g.putImageData(this.image, 0, 0);
@@ -173,7 +176,7 @@ export class Polar {
     this.font(g, 11);
     g.textAlign = "center";
     for (let a = 0; a < 360; a += 30) {
-      const [x, y] = this.at(a, this.radius + 9 * this.scale);
+      const [x, y] = this.at(a, this.radius + 11 * this.scale);
       g.fillStyle = names[a] ? "#e8eef2" : "#7d8b97";
       g.fillText(names[a] ?? String(a), x, y);
     }

@@ -51,14 +51,11 @@ export class Link {
   }
 
   receive(data) {
-    let message;
     try {
-      message = decode(data);
+      this.onMessage(decode(data));
     } catch (error) {
       console.warn("a message was skipped:", error.message);
-      return;
     }
-    this.onMessage(message);
   }
 
   lost(socket) {
