@@ -1,0 +1,101 @@
+"""Sentences of NMEA 0183 and their kin, cut out of a stream of bytes, with their checksum."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from dataclasses import dataclass
+from typing import Final, Literal
+
+LONGEST: Final = 256
+"""The standard's 82 characters are too few for real compasses; this only bounds what a broken line can hold."""
+
+_MARK: Final = re.compile(rb"[$\r\n]")
+_SUM: Final = re.compile(rb"[0-9A-Fa-f]{2}")
+_GARBLED: Final = re.compile(rb"[^\x20-\x7e]")
+
+Verdict = Literal["right", "wrong", "absent"]
+
+
+@dataclass(frozen=True, slots=True)
+class Sentence:
+    """What stands between ``$`` and ``*`` or the end of the line; ``t_ns`` is when its ``$`` arrived."""
+
+    t_ns: int
+    body: bytes
+    checksum: Verdict
+
+
+class SentenceReader:
+    """Cuts sentences out of a stream, in memory bounded by `LONGEST`; the same for any pieces.
+
+    A sentence ends with its line.  One that runs into the next ``$``, or into the end of the stream, counts only if
+    it carries a right checksum: nothing else tells whether it is whole.
+    """
+
+    def __init__(self) -> None:
+        self.skipped = 0
+        self.bad: Counter[str] = Counter()
+        self._line: bytearray | None = None
+        self._t_ns = 0
+
+    def push(self, t_ns: int, data: bytes) -> list[Sentence]:
+        """Take bytes that arrived at ``t_ns`` and return the sentences that they complete."""
+        sentences: list[Sentence] = []
+        at = 0
+        for mark in _MARK.finditer(data):
+            self._hold(data[at : mark.start()])
+            opening = mark.group() == b"$"
+            sentences += self._end(cut_short=opening)
+            if opening:
+                self._line, self._t_ns = bytearray(), t_ns
+            at = mark.end()
+        self._hold(data[at:])
+        return sentences
+
+    def finish(self) -> list[Sentence]:
+        """End the stream."""
+        return self._end(cut_short=True)
+
+    def _hold(self, piece: bytes) -> None:
+        if self._line is None:
+            self.skipped += len(piece)
+            return
+        self._line += piece
+        if len(self._line) > LONGEST:
+            self.skipped += 1 + len(self._line)
+            self.bad["too_long"] += 1
+            self._line = None
+
+    def _end(self, *, cut_short: bool) -> list[Sentence]:
+        line, self._line = self._line, None
+        if line is None:
+            return []
+        if _GARBLED.search(line):
+            self.bad["garbled"] += 1
+            self.skipped += 1 + len(line)
+            return []
+        sentence = _sentence(self._t_ns, bytes(line))
+        if cut_short and sentence.checksum != "right":
+            self.skipped += 1 + len(line)
+            return []
+        return [sentence]
+
+
+def _sentence(t_ns: int, line: bytes) -> Sentence:
+    body, star, digits = line.rpartition(b"*")
+    if not star:
+        return Sentence(t_ns, line, "absent")
+    digits = digits.strip()
+    if not digits:
+        return Sentence(t_ns, body, "absent")
+    right = _SUM.fullmatch(digits) is not None and int(digits, 16) == xor(body)
+    return Sentence(t_ns, body, "right" if right else "wrong")
+
+
+def xor(body: bytes) -> int:
+    """Checksum of the bytes between ``$`` and ``*``."""
+    total = 0
+    for byte in body:
+        total ^= byte
+    return total
