@@ -1,0 +1,99 @@
+"""Closing holes, smallest first: ends are found, matched and joined, and what was joined helps the next larger gap."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from fill.candidates import Candidate
+from fill.certainty import Logistic
+from fill.freedom import capped
+from fill.matching import assign, candidates, gain
+from fill.segments import find_walls
+from mapping.values import OCCUPIED, UNKNOWN
+
+THRESHOLD: Final = 0.4
+"""A fill less likely right than this is not drawn: the end stays open."""
+_FIRST_ROUND: Final = 4.0  # cells; each round reaches twice as far
+
+
+@dataclass(frozen=True, slots=True)
+class Closed:
+    """A hole that was closed.
+
+    ``cells`` ``(n, 2)`` int32 were unknown and became wall, ``away`` ``(n,)`` float64 is each one's distance from the
+    nearer end in cells, ``chance`` the probability that the candidate is right.
+    """
+
+    candidate: Candidate
+    cells: NDArray[np.int32]
+    away: NDArray[np.float64]
+    chance: float
+
+
+def close_holes(
+    state: NDArray[np.uint8], longest: float, model: Logistic, threshold: float = THRESHOLD
+) -> tuple[list[Closed], NDArray[np.float64]]:
+    """Close the holes of ``state`` ``(rows, cols)`` up to ``longest`` cells.
+
+    Also returns the ends left open, ``(n, 2)`` of x and y in cells.
+    """
+    wall = state == OCCUPIED
+    closed: list[Closed] = []
+    for reach in _rounds(longest):
+        walls = find_walls(wall)
+        walls = dataclasses.replace(walls, ends=tuple(end for end in walls.ends if not capped(end, state)))
+        found = candidates(walls, state, reach)
+        if not found:
+            continue
+        chances = model.chance(np.stack([each.features for each in found]))
+        gains = [gain(float(chance), threshold) for chance in chances]
+        for index in assign(found, gains):
+            cells = fill_cells(found[index], state, wall)
+            if len(cells):
+                closed.append(Closed(found[index], cells, _away(cells, found[index]), float(chances[index])))
+                wall[cells[:, 0], cells[:, 1]] = True
+    left = [end for end in find_walls(wall).ends if not capped(end, state)]
+    return closed, np.array([(end.x, end.y) for end in left]).reshape(-1, 2)
+
+
+def _rounds(longest: float) -> Iterator[float]:
+    reach = _FIRST_ROUND
+    while reach < longest:
+        yield reach
+        reach *= 2.0
+    yield longest
+
+
+def _away(cells: NDArray[np.int32], candidate: Candidate) -> NDArray[np.float64]:
+    ends = np.array([candidate.start, candidate.finish])[:, ::-1]
+    return np.asarray(np.hypot(*(cells[None] - ends[:, None]).transpose(2, 0, 1)).min(axis=0), np.float64)
+
+
+def fill_cells(candidate: Candidate, state: NDArray[np.uint8], wall: NDArray[np.bool_]) -> NDArray[np.int32]:
+    """Unknown cells ``(n, 2)`` that the fill takes: its path, and about it the thickness of the walls it joins."""
+    path = candidate.path
+    margin = int(max(candidate.half_a, candidate.half_b)) + 2
+    low = np.maximum(path.min(axis=0) - margin, 0)
+    high = path.max(axis=0) + margin + 1
+    window = slice(low[0], high[0]), slice(low[1], high[1])
+    open_here = (state[window] == UNKNOWN) & ~wall[window]
+    rows, cols = (path - low).T
+    bare = np.ones(open_here.shape, bool)
+    bare[rows, cols] = False
+    away, nearest = ndimage.distance_transform_edt(bare, return_indices=True)
+    place = np.zeros(open_here.shape)
+    place[rows, cols] = np.linspace(0.0, 1.0, len(path))
+    share = place[nearest[0], nearest[1]]
+    radius = candidate.half_a + share * (candidate.half_b - candidate.half_a) - 0.5
+    taken = open_here & (away <= np.maximum(radius, 0.0) + 1e-9)
+    parts, _ = ndimage.label(taken)
+    kept = np.isin(parts, np.unique(parts[rows, cols])) & taken
+    cells: NDArray[np.int32] = (np.argwhere(kept) + low).astype(np.int32)
+    return cells

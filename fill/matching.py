@@ -1,0 +1,129 @@
+"""Which ends belong together: candidates by distance, direction and shape, then one assignment.
+
+Leaving an end open is a choice as well: a candidate must be likelier right than the threshold asks, and of
+candidates that share an end or cross each other the set with the greatest gain is taken.  (The paper, section 3.2,
+takes the lowest fitting error without a limit, so that in the end every end is matched to something.)
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from fill.candidates import Candidate, across, onto_side
+from fill.segments import Walls
+
+_PARTNERS: Final = 6  # candidates of an end that are worth drawing
+_EXACT: Final = 14  # up to so many candidates in conflict are solved exactly
+
+
+def candidates(walls: Walls, state: NDArray[np.uint8], longest: float) -> list[Candidate]:
+    """Every way to close a hole of up to ``longest`` cells that no free water forbids."""
+    found = []
+    for first, second in _pairs(walls, longest):
+        candidate = across(first, second, walls, state)
+        if candidate is not None:
+            found.append(candidate)
+    for index in range(len(walls.ends)):
+        candidate = onto_side(index, walls, state, longest)
+        if candidate is not None:
+            found.append(candidate)
+    return found
+
+
+def assign(found: Sequence[Candidate], gains: Sequence[float]) -> list[int]:
+    """Return the candidates to take: each end once, no crossings, the greatest sum of ``gains`` above 0."""
+    live = [index for index, gain in enumerate(gains) if gain > 0]
+    rivals = {index: {other for other in live if other != index and _conflict(found[index], found[other])}
+              for index in live}  # fmt: skip
+    taken: list[int] = []
+    left = set(live)
+    for index in live:
+        if index in left:
+            group = _group(index, rivals)
+            left -= group
+            taken += _best_set(sorted(group), rivals, gains)
+    return sorted(taken)
+
+
+def _pairs(walls: Walls, longest: float) -> list[tuple[int, int]]:
+    """Pairs of ends that are near enough and look at each other; for each end the few most plausible."""
+    ends = walls.ends
+    if len(ends) < 2:
+        return []
+    places = np.array([(end.x, end.y) for end in ends])
+    aims = np.array([(end.dx, end.dy) for end in ends])
+    pairs = cKDTree(places).query_pairs(longest, output_type="ndarray")
+    if not len(pairs):
+        return []
+    a, b = np.sort(pairs, axis=1).T
+    apart = places[b] - places[a]
+    gap = np.maximum(np.hypot(apart[:, 0], apart[:, 1]), 1.0)
+    ahead_a = np.sum(apart * aims[a], axis=1) / gap
+    ahead_b = -np.sum(apart * aims[b], axis=1) / gap
+    # Over a few cells a direction is not known well: a slack of one and a half cells is granted.
+    slack = 1.5 / gap
+    fits = (ahead_a + slack > -0.2) & (ahead_b + slack > -0.2) & (ahead_a + ahead_b + slack > 0.4)
+    price = gap * (2.0 - np.minimum(ahead_a, 1.0)) * (2.0 - np.minimum(ahead_b, 1.0))
+    order = np.flatnonzero(fits)[np.lexsort((b[fits], a[fits], price[fits]))]
+    used = np.zeros(len(ends), np.int64)
+    kept = []
+    for pair in order:
+        first, second = int(a[pair]), int(b[pair])
+        if used[first] < _PARTNERS and used[second] < _PARTNERS:
+            used[[first, second]] += 1
+            kept.append((first, second))
+    return kept
+
+
+def _conflict(one: Candidate, other: Candidate) -> bool:
+    if one.first in (other.first, other.second) or (one.second >= 0 and one.second in (other.first, other.second)):
+        return True
+    low = np.maximum(one.box[:2], other.box[:2])
+    high = np.minimum(one.box[2:], other.box[2:])
+    return bool(np.all(low <= high)) and not one.cells.isdisjoint(other.cells)
+
+
+def _group(start: int, rivals: dict[int, set[int]]) -> set[int]:
+    group, todo = {start}, [start]
+    while todo:
+        fresh = rivals[todo.pop()] - group
+        group |= fresh
+        todo += sorted(fresh)
+    return group
+
+
+def _best_set(group: list[int], rivals: dict[int, set[int]], gains: Sequence[float]) -> list[int]:
+    """Return the heaviest set without conflicts: exact where the group is small, else heaviest first."""
+    order = sorted(group, key=lambda index: (-gains[index], index))
+    if len(order) > _EXACT:
+        taken: list[int] = []
+        for index in order:
+            if rivals[index].isdisjoint(taken):
+                taken.append(index)
+        return taken
+    return _branch(order, rivals, gains)[1]
+
+
+def _branch(order: list[int], rivals: dict[int, set[int]], gains: Sequence[float]) -> tuple[float, list[int]]:
+    if not order:
+        return 0.0, []
+    index, rest = order[0], order[1:]
+    free = [other for other in rest if other not in rivals[index]]
+    with_sum, with_set = _branch(free, rivals, gains)
+    best = (gains[index] + with_sum, [index, *with_set])
+    if len(free) == len(rest):
+        return best
+    without = _branch(rest, rivals, gains)
+    return best if best[0] >= without[0] else without
+
+
+def gain(chance: float, threshold: float) -> float:
+    """Return what a fill of this chance is worth above staying open: log-odds above those of the threshold."""
+    clipped = min(max(chance, 1e-6), 1.0 - 1e-6)
+    return math.log(clipped / (1.0 - clipped)) - math.log(threshold / (1.0 - threshold))
