@@ -11,8 +11,10 @@ from typing import Final, Protocol, cast
 from config.errors import LacunaError, UsageError
 
 COMMANDS: Final[dict[str, tuple[str, str]]] = {
+    "import": ("tools.import_log", "a foreign recording as a log"),
     "emulate": ("tools.emulate", "an emulated vehicle on two pseudo-terminals, or recorded to a file"),
     "dashboard": ("tools.dashboard_command", "the live page in a browser"),
+    "fill": ("tools.fill_map", "fill the holes of a ROS map_server map"),
     "check-config": ("tools.check_config", "say every mistake of a configuration file"),
 }
 """Name of each command, its module, and what it does in one line."""
