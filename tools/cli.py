@@ -16,6 +16,8 @@ COMMANDS: Final[dict[str, tuple[str, str]]] = {
     "dashboard": ("tools.dashboard_command", "the live page in a browser"),
     "fill": ("tools.fill_map", "fill the holes of a ROS map_server map"),
     "check-config": ("tools.check_config", "say every mistake of a configuration file"),
+    "replay": ("tools.replay", "map recorded logs as if they were live"),
+    "run": ("tools.run", "the daemon: record, map, publish"),
 }
 """Name of each command, its module, and what it does in one line."""
 
