@@ -39,6 +39,8 @@ def run(args: argparse.Namespace) -> int:
         raise ConfigError(f"{args.host} can be reached from other machines: give --token WORD, or leave --host away")
     if args.token is not None and len(args.token) < 8:
         raise UsageError("the token is too short: take 8 characters or more")
+    if not 0 <= args.port <= 65535:
+        raise UsageError(f"there is no port {args.port}; give --port 1 to 65535, or 0 for a free one")
     keys = curve_from(Path(args.keys).expanduser()) if args.keys is not None else None
     peer = Peer(args.connect, args.requests, keys)
     peer.check()
@@ -56,7 +58,7 @@ def listen(host: str, port: int) -> socket.socket:
     try:
         kind, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0]
         listener = socket.socket(kind, socket.SOCK_STREAM)
-    except (OSError, OverflowError) as error:
+    except OSError as error:
         raise PortError(f"cannot listen on {host} port {port} ({error}); choose another --host") from None
     try:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

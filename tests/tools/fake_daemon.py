@@ -191,6 +191,7 @@ class FakeDaemon:
     """Serves the site on ``port`` and ``port + 1`` until closed; ``heard`` holds the requests that came."""
 
     def __init__(self, port: int, session: str = "session-one", pings_hz: float = 40.0) -> None:
+        self.port = port
         self.heard: list[Request] = []
         self.silent = threading.Event()
         self._ended = threading.Event()
