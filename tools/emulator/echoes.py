@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from tools.emulator.fan import View
 from tools.emulator.scene import Scene
 from tools.emulator.site import Site
 from tools.emulator.speckle import Speckle
@@ -62,7 +63,7 @@ class EchoModel:
         """
         angle = (place.heading_rad + bearing_rad) % (2.0 * np.pi)
         ranges: Floats = (np.arange(sampling.bins, dtype=np.float64) + 0.5) * sampling.bin_m
-        wall = self._scene.power(place.x_m, place.y_m, place.depth_m, angle, sampling.bin_m, sampling.bins)
+        wall = self._scene.power(View(place.x_m, place.y_m, place.depth_m, sampling.bin_m, sampling.bins), angle)
         noise = [self._speckle.along(place.x_m, place.y_m, angle, ranges, layer) for layer in range(3)]
         level = _db(wall) + SPECKLE_DB * _skewed(noise[0])
         floor = np.where(ranges >= _FLOOR_FROM_M, _FLOOR_DB + SPECKLE_DB * _skewed(noise[1]), -40.0)

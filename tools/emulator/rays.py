@@ -59,13 +59,13 @@ class Hits:
 
 def cast(segments: Segments, origin: Floats, direction: Floats) -> Hits:
     """Find the first wall along rays; ``origin`` and ``direction`` are ``(n, 2)`` or broadcast to it."""
-    ax, ay = segments.along[:, 0], segments.along[:, 1]
-    dx, dy = direction[:, 0, None], direction[:, 1, None]
-    px, py = segments.start[:, 0] - origin[:, 0, None], segments.start[:, 1] - origin[:, 1, None]
-    cross = dx * ay - dy * ax
+    across = np.stack([segments.along[:, 1], -segments.along[:, 0]])
+    beside = np.stack([-segments.start[:, 1], segments.start[:, 0]])
+    cross = direction @ across
+    own = origin[:, 0] * direction[:, 1] - origin[:, 1] * direction[:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
-        way = (px * ay - py * ax) / cross
-        share = (px * dy - py * dx) / cross
+        way = ((segments.start * across.T).sum(axis=1) - origin @ across) / cross
+        share = (direction @ beside - own[:, None]) / cross
         way[~((share >= 0.0) & (share <= 1.0) & (way > _CLEAR_M))] = NOTHING_M
     first = way.argmin(axis=1)
     rows = np.arange(len(first))
@@ -94,8 +94,8 @@ def trace(segments: Segments, origin: Floats, angle_rad: Floats, bounces: int) -
 
 
 def corners(walls: Sequence[Wall], least_turn_rad: float = 0.9) -> Floats:
-    """Return the points ``(k, 2)`` where a wall turns sharply enough to answer as a corner."""
-    found = []
+    """Return the points ``(k, 2)`` where walls turn sharply enough to answer as a corner."""
+    found = [np.empty((0, 2))]
     for wall in walls:
         points = wall.points_m
         back = points - np.roll(points, 1, axis=0)
@@ -105,4 +105,4 @@ def corners(walls: Sequence[Wall], least_turn_rad: float = 0.9) -> Floats:
         if not wall.closed:
             sharp[[0, -1]] = False
         found.append(points[sharp])
-    return np.concatenate(found) if found else np.empty((0, 2))
+    return np.concatenate(found)
