@@ -6,7 +6,6 @@ import contextlib
 import errno
 from collections.abc import Callable
 from pathlib import Path
-from types import TracebackType
 from typing import Final, Self
 
 import zmq
@@ -41,11 +40,12 @@ class Broker:
     keys in the folder's ``authorized``.
     """
 
-    def __init__(self, publish: Publish, session: str, ask: Ask) -> None:
+    def __init__(self, publish: Publish, session: str, ask: Ask | None = None) -> None:
         if publish.keys is None and not is_loopback(publish.bind):
             raise ConfigError(f"{publish.bind} is not loopback: set [publish] keys to a folder made by 'lacuna keygen'")
         self.values = LastValues(session)
-        self._ask = ask
+        self.ask = ask
+        """Who deals with requests; without it they are refused."""
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self._door: ThreadAuthenticator | None = None
         self._others: dict[zmq.Socket[bytes], Callable[[], None]] = {}
@@ -102,9 +102,7 @@ class Broker:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _socket(self, kind: int, publish: Publish, largest: int) -> zmq.Socket[bytes]:
@@ -127,10 +125,12 @@ class Broker:
             split = 2 if len(parts) > 2 and parts[1] == b"" else 1
             route, words = tuple(parts[:split]), parts[split:]
             said = requests.parse(b"".join(words))
+            if isinstance(said, Request) and self.ask is None:
+                said = Refusal(said.id, "unavailable", "nobody deals with requests yet", "ask again")
             if isinstance(said, Refusal):
                 self.answer(route, requests.refused(said))
-            else:
-                self._ask(route, said)
+            elif self.ask is not None:
+                self.ask(route, said)
 
 
 def _authenticator(context: zmq.Context[zmq.Socket[bytes]], keys: Path) -> ThreadAuthenticator:

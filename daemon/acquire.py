@@ -1,0 +1,217 @@
+"""The acquisition's process: ports, log, sonar.  ``python -m daemon.acquire`` is started by the supervisor.
+
+It shares nothing with the map but the log, and imports none of its libraries: native code there may hold the
+interpreter for longer than a kernel's serial buffer lasts.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import platform
+import sys
+from importlib.metadata import version
+from typing import Any, Final
+
+from drivers.tritech.head import Head
+
+from config.errors import LacunaError, PortError
+from config.schema import Sonar
+from daemon import snapshots
+from daemon.beams import Beams
+from daemon.job import Job
+from daemon.line import Line
+from daemon.link import ANSWER, READY, Link, take_job
+from daemon.recorder import Recorder
+from drivers.decoders import SONAR_PORT
+from drivers.log import LogWriter
+from drivers.records import Json
+
+_LOOK_S: Final = 0.02
+_HEALTH_NS: Final = 1_000_000_000
+
+
+class Acquisition:
+    """Opens the ports, then the log; raises PortError or LogError before anything is recorded."""
+
+    def __init__(self, job: Job, link: Link) -> None:
+        self._job = job
+        self._link = link
+        self._clock = job.clock
+        self._sonar = job.config.sonar
+        self._head: Head | None = Head(self._sonar)
+        self._beams = Beams(job.config)
+        self._lines = _lines(job)
+        self._told_ns = 0
+        try:
+            self._open(must=job.is_first)
+            self._recorder = self._start_log()
+        except LacunaError:
+            self._close_ports()
+            raise
+
+    def run(self) -> None:
+        """Acquire until told to stop; then let the sonar rest, close the log, and return."""
+        for line in self._lines.values():
+            self._tell_port("port_opened" if line.is_open else "port_lost", line)
+        while not self._link.is_stopping:
+            for command in self._link.wait(_LOOK_S):
+                self._obey(command)
+            t_ns, _ = self._clock.now()
+            for line in self._lines.values():
+                self._serve(line, t_ns)
+            if self._head is not None:
+                self._send(self._head.tick(t_ns))
+            self._recorder.tick(t_ns)
+            self._tell_health(t_ns)
+        self._stop()
+
+    def _open(self, must: bool) -> None:
+        for line in self._lines.values():
+            try:
+                line.open()
+            except PortError:
+                if must:
+                    raise
+                continue
+            self._watch(line)
+
+    def _start_log(self) -> Recorder:
+        job = self._job
+        unfinished = sorted(path.name for path in job.folder.glob("*.mcap.part"))
+        writer = LogWriter(job.folder, job.session, job.config, _versions(), resume=not job.is_first)
+        recorder = Recorder(writer, job.folder, job.config.recording.disk_low_mib, self._clock, self._link.say)
+        started: dict[str, Json] = {"pid": os.getpid(), "resumed": not job.is_first, "unfinished_logs": [*unfinished]}
+        recorder.event("started", started)
+        return recorder
+
+    def _serve(self, line: Line, t_ns: int) -> None:
+        """Read what has come and record it, before anything else sees it; bring a lost port back."""
+        if not line.is_open:
+            if line.is_due(t_ns) and line.try_again(t_ns):
+                self._came_back(line)
+            return
+        try:
+            data = line.read(t_ns)
+        except PortError as error:
+            self._lose(line, error)
+            return
+        if data:
+            chunk = self._recorder.chunk(line.name, "rx", data)
+            for each in self._beams.push(chunk):
+                self._link.say(each)
+            if line.name == SONAR_PORT and self._head is not None:
+                self._send(self._head.push(chunk.t_ns, data))
+
+    def _send(self, data: bytes) -> None:
+        """Record what goes to the sonar, then send it."""
+        line = self._lines[SONAR_PORT]
+        if not data or not line.is_open:
+            return
+        self._recorder.chunk(line.name, "tx", data)
+        try:
+            line.write(data)
+        except PortError as error:
+            self._lose(line, error)
+
+    def _lose(self, line: Line, error: PortError) -> None:
+        if line.descriptor is not None:
+            self._link.forget(line.descriptor)
+        line.drop(self._clock.now()[0])
+        self._tell_port("port_lost", line, str(error))
+
+    def _came_back(self, line: Line) -> None:
+        self._watch(line)
+        self._tell_port("port_opened", line)
+        if line.name == SONAR_PORT and self._head is not None:
+            # Whatever hangs on the line now may have been without power: it is set up from the beginning.
+            self._head = Head(self._sonar)
+
+    def _watch(self, line: Line) -> None:
+        if line.descriptor is not None:
+            self._link.watch(line.descriptor)
+
+    def _tell_port(self, kind: str, line: Line, why: str = "") -> None:
+        fields: dict[str, Json] = {"port": line.name, "url": line.url}
+        self._recorder.event(kind, fields | ({"message": why} if why else {}))
+
+    def _obey(self, command: dict[str, Any]) -> None:
+        """Do what the operator asked for; it is in the log before it is answered."""
+        do, fields = command["do"], command["fields"]
+        error: str | None = None
+        if do == "sonar":
+            self._set_sonar(fields)
+        elif do == "save":
+            error = self._recorder.sync()
+        else:
+            self._recorder.event(do, fields)
+        answer: dict[str, Json] = {"token": command["token"], "error": error}
+        self._link.report(ANSWER, answer | {"fields": self._recorder.health() if do == "save" else {}})
+
+    def _set_sonar(self, fields: dict[str, Any]) -> None:
+        changed = {key: value for key, value in fields.items() if key not in ("start", "stop")}
+        self._sonar = Sonar.model_validate(self._sonar.model_dump() | changed)
+        self._recorder.event("settings", fields)
+        if fields.get("stop") and self._head is not None:
+            self._send(self._head.stop())
+            self._head = None
+        elif fields.get("start") and self._head is None:
+            self._head = Head(self._sonar)
+        elif self._head is not None:
+            self._send(self._head.change(self._sonar))
+
+    def _tell_health(self, t_ns: int) -> None:
+        if t_ns - self._told_ns < _HEALTH_NS * self._clock.rate:
+            return
+        self._told_ns = t_ns
+        ports = {name: line.health(t_ns, self._beams.counters(name)) for name, line in self._lines.items()}
+        sonar: dict[str, Json] = {
+            "state": "stopped" if self._head is None else str(self._head.state),
+            "pings": self._beams.pings,
+            "range_m": self._sonar.range_m,
+            "gain_pct": self._sonar.gain_pct,
+        }
+        fields: dict[str, Json] = {"ports": {**ports}, "sonar": sonar, **self._recorder.health()}
+        self._link.say(snapshots.health(*self._clock.now(), fields))
+
+    def _stop(self) -> None:
+        if self._head is not None:
+            self._send(self._head.stop())
+        self._recorder.event("stopped", {"pid": os.getpid()})
+        self._close_ports()
+        self._recorder.close()
+
+    def _close_ports(self) -> None:
+        for line in self._lines.values():
+            line.close()
+
+
+def _lines(job: Job) -> dict[str, Line]:
+    sonar = job.config.sonar
+    lines = {SONAR_PORT: Line(SONAR_PORT, sonar.port, sonar.baud)}
+    return lines | {feed.name: Line(feed.name, feed.port, feed.baud) for feed in job.config.feed}
+
+
+def _versions() -> dict[str, str]:
+    return {"lacuna": version("lacuna"), "python": platform.python_version()}
+
+
+def main() -> int:
+    """Acquire the session that standard input names."""
+    job = take_job()
+    link = Link(job.link, "acquire", wait_s=0.0)
+    try:
+        acquisition = Acquisition(job, link)
+        link.report(READY, {})
+        acquisition.run()
+    except LacunaError as error:
+        link.fatal(error)
+        return error.exit_code
+    finally:
+        with contextlib.suppress(KeyboardInterrupt):
+            link.close()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
