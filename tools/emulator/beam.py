@@ -18,8 +18,8 @@ PULSE_M: Final = 0.018
 """Length of a compressed pulse in range."""
 
 # Two-way skirts and side lobes beside the main lobe's peak: degrees off the axis, dB.
-_LOBES_DEG: Final = (0.0, 3.0, 5.0, 10.0, 20.0, 40.0, 60.0, 180.0)
-_LOBES_DB: Final = (-9.0, -11.0, -15.0, -19.0, -27.0, -40.0, -46.0, -50.0)
+_LOBES_DEG: Final = (0.0, 3.0, 5.0, 10.0, 20.0, 30.0, 45.0, 180.0)
+_LOBES_DB: Final = (-9.0, -11.0, -15.0, -19.0, -28.0, -38.0, -50.0, -56.0)
 _RIPPLE_DEG: Final = 4.3
 
 

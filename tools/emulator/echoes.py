@@ -23,9 +23,9 @@ Floats = NDArray[np.float64]
 COUNTS_PER_DB: Final = 255.0 / 80.0
 SPECKLE_DB: Final = 4.5
 _WOBBLE_DB: Final = 0.35
-_FLOOR_DB: Final = 7.0
+_FLOOR_DB: Final = 6.5
+_FLOOR_SD_DB: Final = 5.5
 _FLOOR_FROM_M: Final = 1.56
-_DARK_DB: Final = 9.0
 _NOMINAL_GAIN_DB: Final = 40.0
 
 
@@ -66,9 +66,8 @@ class EchoModel:
         wall = self._scene.power(View(place.x_m, place.y_m, place.depth_m, sampling.bin_m, sampling.bins), angle)
         noise = [self._speckle.along(place.x_m, place.y_m, angle, ranges, layer) for layer in range(3)]
         level = _db(wall) + SPECKLE_DB * _skewed(noise[0])
-        floor = np.where(ranges >= _FLOOR_FROM_M, _FLOOR_DB + SPECKLE_DB * _skewed(noise[1]), -40.0)
+        floor = np.where(ranges >= _FLOOR_FROM_M, _FLOOR_DB + _FLOOR_SD_DB * _skewed(noise[1]), -40.0)
         level = _db(10.0 ** (level / 10.0) + 10.0 ** (floor / 10.0) + 10.0 ** (_specks(ranges, noise[2]) / 10.0))
-        level[(ranges < _FLOOR_FROM_M) & (level < _DARK_DB)] = -40.0
         level = np.maximum(level, _ringing(ranges) + 1.2 * noise[1])
         rng = np.random.default_rng((self._seed, number))
         level += _WOBBLE_DB * rng.standard_normal(sampling.bins) + (sampling.gain_db - _NOMINAL_GAIN_DB)
@@ -96,5 +95,5 @@ def _ringing(ranges_m: Floats) -> Floats:
 
 def _specks(ranges_m: Floats, noise: Floats) -> Floats:
     """Level of small scatterers in the water near the head, fewer and fainter outwards."""
-    rarity = 1.1 + 1.1 * np.maximum(ranges_m - 0.4, 0.0)
-    return np.where(ranges_m > 0.3, np.minimum(4.0 + 26.0 * (noise - rarity), 26.0), -40.0)
+    middle_db = np.interp(ranges_m, (0.30, 0.35, 0.5, 0.75, 1.0, 1.3), (-40.0, 4.0, 1.0, -5.0, -17.0, -40.0))
+    return np.asarray(np.minimum(middle_db + 13.0 * noise, 26.0), dtype=np.float64)

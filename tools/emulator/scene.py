@@ -28,8 +28,8 @@ _COARSE: Final[Floats] = np.arange(0.0, 2.0 * np.pi - 1e-9, _COARSE_STEP)
 _COARSE_BOUNCES: Final = 2
 _LATTICE_M: Final = 0.02
 
-_FLOOR_DB: Final = 50.0
-_SURFACE_DB: Final = 38.0
+_FLOOR_DB: Final = 57.0
+_SURFACE_DB: Final = 43.0
 _CORNER_DB: Final = -5.0
 _CORNER_SLACK_M: Final = 0.08
 

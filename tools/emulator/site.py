@@ -31,8 +31,8 @@ class Material:
     texture_db: float
 
 
-TILE: Final = Material(backscatter_db=0.0, mirror_db=-3.5, corner_db=4.0, texture_db=3.5)
-ROCK: Final = Material(backscatter_db=0.0, mirror_db=-6.5, corner_db=0.0, texture_db=4.5)
+TILE: Final = Material(backscatter_db=0.0, mirror_db=-3.5, corner_db=8.0, texture_db=3.5)
+ROCK: Final = Material(backscatter_db=0.0, mirror_db=-6.5, corner_db=2.0, texture_db=4.5)
 
 
 @dataclass(frozen=True, slots=True)
