@@ -1,0 +1,331 @@
+"""The conversation reaches scanning, keeps a head busy, and recovers from what heads and lines do."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from config.schema import Sonar
+from drivers.tritech import commands
+from drivers.tritech.framing import Deframer
+from drivers.tritech.head import Head
+from drivers.tritech.headdata import HeadData, HeadStatus
+from drivers.tritech.messages import Alive, FpgaCalData, FpgaVersionData, HeadInf, VersionData, encode, user_block
+from drivers.tritech.settings import head_command
+from drivers.tritech.states import STEPS, TRANSITIONS, State
+
+MS = 1_000_000
+SECOND = 1000 * MS
+CENTRING, CENTRED, READY = HeadInf(0x5D), HeadInf(0x4A), HeadInf(0x8A)
+SONAR = Sonar(bins=50)
+
+
+@dataclass
+class ScriptedHead:
+    """A head that answers as the protocol says; its faults are switches."""
+
+    parameters: commands.HeadParameters | None = None
+    centres_at: int = 3 * SECOND
+    pings_per_request: int = 2
+    half_duplex: bool = False
+    alives: bool = True
+    answers_version: bool = True
+    answers_block: bool = True
+    takes_settings: bool = True
+    dead: bool = False
+    status: HeadStatus = HeadStatus.FULL_RANGE_8_BIT
+    own_step: int | None = None
+    period: int = 50 * MS
+    log: list[commands.Command] = field(default_factory=list)
+    queue: list[tuple[int, bytes]] = field(default_factory=list)
+    pings: int = 0
+    _deframer: Deframer = field(default_factory=Deframer)
+    _alive_at: int = 0
+
+    def count(self, kind: type[commands.Command]) -> int:
+        return sum(isinstance(command, kind) for command in self.log)
+
+    def run(self, t_ns: int, data: bytes) -> bytes:
+        for frame in self._deframer.push(t_ns, data):
+            command = commands.decode_command(frame)
+            self.log.append(command)
+            if not self.dead:
+                self._obey(t_ns, command)
+        if self.dead:
+            return b""
+        sent = b"".join(data for at, data in self.queue if at <= t_ns)
+        self.queue = [each for each in self.queue if each[0] > t_ns]
+        if t_ns >= self._alive_at and self.alives and not self.queue:
+            self._alive_at = t_ns + SECOND
+            info = READY if self.parameters else CENTRED if t_ns >= self.centres_at else CENTRING
+            sent += encode(Alive(info))
+        return sent
+
+    def _obey(self, t_ns: int, command: commands.Command) -> None:
+        match command:
+            case commands.SendVersion() if self.answers_version:
+                self.queue.append((t_ns + 10 * MS, encode(VersionData(0x31))))
+            case commands.SendBBUser() if self.answers_block:
+                reply = encode(user_block(half_duplex=self.half_duplex))
+                self.queue.append(
+                    (t_ns + 30 * MS, reply + encode(FpgaCalData(bytes(66))) + encode(FpgaVersionData(bytes(14))))
+                )
+            case commands.HeadCommand(parameters) if self.takes_settings:
+                self.parameters = parameters
+                self.status = HeadStatus.FULL_RANGE_8_BIT
+                self._alive_at = t_ns + 300 * MS
+            case commands.SendData():
+                self._ping(t_ns)
+            case commands.ReBoot():
+                self.parameters, self.queue, self.takes_settings = None, [], True
+                self.centres_at = t_ns + 3 * SECOND
+
+    def _ping(self, t_ns: int) -> None:
+        if self.parameters is None:
+            return
+        start = max([t_ns, *(at for at, _ in self.queue)])
+        for number in range(self.pings_per_request):
+            self.pings += 1
+            self.queue.append((start + (number + 1) * self.period, self.ping(self.parameters)))
+
+    def ping(self, wanted: commands.HeadParameters) -> bytes:
+        data = HeadData(
+            bearing=3200,
+            bins=bytes(wanted.bins),
+            ad_interval=wanted.ad_interval,
+            step=self.own_step or wanted.step,
+            left_limit=wanted.left_limit,
+            right_limit=wanted.right_limit,
+            control=wanted.control,
+            status=self.status,
+            gain=wanted.gain_1,
+        )
+        return encode(data)
+
+
+class Line:
+    """Both ends and a clock."""
+
+    def __init__(self, scripted: ScriptedHead | None = None, sonar: Sonar = SONAR) -> None:
+        self.head = Head(sonar)
+        self.scripted = scripted or ScriptedHead()
+        self.t_ns = 7 * SECOND * 1000
+        self.scripted.centres_at += self.t_ns
+        self.states: list[str] = []
+        self._to_head = b""
+
+    def run(self, seconds: float, drop_every: int = 0) -> Line:
+        dropped = 0
+        for _ in range(int(seconds * 100)):
+            self.t_ns += 10 * MS
+            data = self.scripted.run(self.t_ns, self._to_head)
+            if data and drop_every:
+                dropped += 1
+                data = data if dropped % drop_every else data[: len(data) // 2] + data[len(data) // 2 + 5 :]
+            self._to_head = self.head.push(self.t_ns, data) if data else self.head.tick(self.t_ns)
+            if not self.states or self.states[-1] != self.head.state:
+                self.states.append(self.head.state)
+        return self
+
+
+def test_from_power_up_to_scanning() -> None:
+    line = Line().run(10)
+    assert line.states == ["centring", "version", "user_block", "setting", "scanning"]
+    assert [type(command) for command in line.scripted.log[:4]] == [
+        commands.SendVersion,
+        commands.SendBBUser,
+        commands.HeadCommand,
+        commands.SendData,
+    ]
+    assert line.scripted.log[2] == head_command(SONAR)
+    assert (line.head.version, line.head.user_block) == (VersionData(0x31), user_block())
+    # Two pings a request, one each 50 ms, without a pause longer than a tick or two.
+    assert line.scripted.pings > 0.7 * 5 * 20
+    assert line.scripted.count(commands.SendData) == pytest.approx(line.scripted.pings / 2, abs=1)
+
+
+@pytest.mark.parametrize(
+    "scripted",
+    [
+        ScriptedHead(answers_version=False),
+        ScriptedHead(answers_block=False),
+        ScriptedHead(alives=False),
+        ScriptedHead(half_duplex=True, pings_per_request=1),
+        ScriptedHead(pings_per_request=1),
+        ScriptedHead(parameters=head_command(SONAR).parameters),
+    ],
+    ids=["no version", "no user block", "no alives", "half duplex", "one ping a request", "set before"],
+)
+def test_heads_that_differ(scripted: ScriptedHead) -> None:
+    line = Line(scripted).run(20)
+    assert line.head.state == "scanning"
+    before = scripted.pings
+    line.run(10)
+    assert scripted.pings - before > 120
+    assert scripted.count(commands.ReBoot) == 0
+
+
+def test_requests_do_not_pile_up() -> None:
+    line = Line().run(30)
+    assert len(line.scripted.queue) <= 2
+    single = Line(ScriptedHead(pings_per_request=1)).run(30)
+    assert len(single.scripted.queue) <= 1
+
+
+def test_nothing_is_sent_before_there_was_time_to_listen() -> None:
+    head = Head(SONAR)
+    assert head.tick(5 * SECOND) == b""
+    assert head.tick(7 * SECOND) == b""
+    assert head.tick(8 * SECOND) == commands.encode_command(commands.SendVersion())
+    assert head.state == "silent"
+
+
+def test_a_dead_head_is_asked_and_rebooted_once_a_minute() -> None:
+    line = Line(ScriptedHead(dead=True)).run(140)
+    sent = Counter(type(command) for command in line.scripted.log)
+    assert set(sent) == {commands.SendVersion, commands.ReBoot}
+    assert (sent[commands.ReBoot], line.head.state) == (2, "silent")
+    line.scripted.dead = False
+    line.run(15)
+    assert line.head.state == "scanning"
+
+
+def test_damaged_frames_cost_little() -> None:
+    line = Line().run(10)
+    before = line.scripted.pings
+    line.run(60, drop_every=100)
+    assert line.head.state == "scanning"
+    assert line.scripted.pings - before > 0.6 * 60 * 20
+    assert line.head._requests.pings_per_request == 2
+
+
+def test_unplugged_and_plugged_again() -> None:
+    line = Line().run(10)
+    line.scripted.dead = True
+    line.run(30)
+    assert line.head.state == "silent"
+    line.scripted.dead = False
+    line.run(10)
+    assert line.head.state == "scanning"
+
+
+def test_power_loss_is_answered_with_the_settings() -> None:
+    line = Line().run(10)
+    line.scripted.status = HeadStatus(0x11)
+    line.states.clear()
+    line.run(5)
+    assert line.states == ["scanning", "setting", "scanning"]
+    assert line.scripted.count(commands.HeadCommand) == 2
+    assert line.scripted.count(commands.ReBoot) == 0
+
+
+def test_a_motor_that_stays_lost_reboots_the_head() -> None:
+    line = Line().run(10)
+    broken = HeadStatus(0x12)
+    for _ in range(400):
+        line.scripted.status = broken
+        line.run(0.05)
+        if line.scripted.count(commands.ReBoot):
+            break
+    assert line.scripted.count(commands.HeadCommand) >= 3
+    assert line.scripted.count(commands.ReBoot) == 1
+    line.scripted.status = HeadStatus.FULL_RANGE_8_BIT
+    line.run(15)
+    assert line.head.state == "scanning"
+
+
+def test_a_head_that_restarts_gets_everything_again() -> None:
+    line = Line().run(10)
+    line.scripted.parameters, line.scripted.queue = None, []
+    line.scripted.centres_at = line.t_ns + 3 * SECOND
+    line.states.clear()
+    line.run(12)
+    assert line.states[-5:] == ["centring", "version", "user_block", "setting", "scanning"]
+
+
+def test_a_head_that_refuses_its_settings_is_rebooted() -> None:
+    line = Line(ScriptedHead(takes_settings=False)).run(40)
+    assert line.scripted.count(commands.ReBoot) == 1
+    assert line.head.state == "scanning"
+
+
+def test_settings_change_and_old_pings_are_let_through() -> None:
+    line = Line().run(10)
+    longer = SONAR.model_copy(update={"range_m": 20.0})
+    line.head.change(longer)
+    assert line.head.sonar == longer
+    line.run(5)
+    assert line.head.state == "scanning"
+    assert line.scripted.parameters == head_command(longer).parameters
+    assert line.scripted.count(commands.HeadCommand) == 2
+    assert not line.head.settings_differ
+
+
+def test_a_head_with_a_will_of_its_own_is_taken_as_it_is() -> None:
+    line = Line(ScriptedHead(own_step=16)).run(60)
+    assert (line.head.state, line.head.settings_differ) == ("scanning", True)
+    assert line.scripted.count(commands.HeadCommand) == 3
+    before = line.scripted.pings
+    line.run(10)
+    assert line.scripted.pings - before > 120
+
+
+def test_stop_leaves_the_head_idle_and_start_goes_on() -> None:
+    line = Line().run(10)
+    line.head.stop()
+    line.run(1)
+    asked = len(line.scripted.log)
+    line.run(30)
+    assert (line.head.state, len(line.scripted.log)) == ("stopped", asked)
+    line.head.change(SONAR.model_copy(update={"gain_pct": 10.0}))
+    line.run(5)
+    assert line.head.state == "stopped"
+    line.head.start()
+    line.run(5)
+    assert line.head.state == "scanning"
+    assert line.scripted.parameters is not None
+    assert line.scripted.parameters.gain_1 == 21
+
+
+def test_other_nodes_are_not_heard() -> None:
+    head = Head(SONAR)
+    head.push(SECOND, encode(Alive(CENTRED), head=3))
+    assert head.state == "silent"
+    assert head.push(2 * SECOND, encode(Alive(CENTRED))) == commands.encode_command(commands.SendVersion())
+    assert head.state == "version"
+
+
+def test_the_table_is_whole() -> None:
+    assert set(STEPS) == set(State)
+    assert {state for state, _ in TRANSITIONS} | {State.STOPPED} == set(State)
+    reached = set(TRANSITIONS.values()) | {step.then for step in STEPS.values()}
+    assert reached == set(State)
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    st.lists(
+        st.one_of(
+            st.binary(max_size=20),
+            st.sampled_from(
+                [encode(Alive(CENTRING)), encode(Alive(CENTRED)), encode(Alive(READY)), encode(VersionData(1))]
+            ),
+            st.sampled_from([encode(user_block()), ScriptedHead().ping(head_command(SONAR).parameters)]),
+        ),
+        max_size=30,
+    ),
+    st.integers(1, 3 * SECOND),
+)
+def test_anything_may_be_heard(pieces: list[bytes], pause: int) -> None:
+    head, deframer = Head(SONAR), Deframer()
+    sent = b""
+    for index, data in enumerate(pieces):
+        sent += head.push(index * pause, data) + head.tick(index * pause + pause // 2)
+    frames = deframer.push(0, sent)
+    assert b"".join(frame.data for frame in frames) == sent
+    assert all(commands.decode_command(frame) for frame in frames)
+    assert head.state in {state.value for state in State}
