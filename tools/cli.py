@@ -12,6 +12,8 @@ from config.errors import LacunaError, UsageError
 
 COMMANDS: Final[dict[str, tuple[str, str]]] = {
     "import": ("tools.import_log", "a foreign recording as a log"),
+    "info": ("tools.info", "what is in a log"),
+    "salvage": ("tools.salvage", "what can be read of a broken log, into a new one"),
     "emulate": ("tools.emulate", "an emulated vehicle on two pseudo-terminals, or recorded to a file"),
     "dashboard": ("tools.dashboard_command", "the live page in a browser"),
     "fill": ("tools.fill_map", "fill the holes of a ROS map_server map"),

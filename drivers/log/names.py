@@ -74,3 +74,9 @@ def _logs(folder: Path) -> list[Path]:
         return []
     except OSError as error:
         raise InputError(f"cannot list {folder}: {error.strerror}; check its permissions") from error
+
+
+def session_of(path: Path) -> str:
+    """Return the session that the name of ``path`` tells."""
+    match = _NAME.fullmatch(path.name)
+    return match["session"] if match else path.name.removesuffix(PART).removesuffix(".mcap")

@@ -97,7 +97,7 @@ def read_metadata(path: Path) -> dict[str, str]:
             has_records = True
             break  # the header stands before all chunks
     if has_records:
-        raise DataError(f"{path.name}: its header is damaged; the records can be read, the configuration cannot")
+        raise DataError(f"{path.name}: its header is damaged, its records are not; give a configuration with --config")
     raise nothing_in(files[0])
 
 

@@ -37,9 +37,9 @@ def assign(survey: Survey, told: Mapping[str, str], base: Config, baud: int, fee
     _check(survey, told)
     drivers = {name: told.get(name, probe.driver) for name, probe in survey.lines.items()}
     if not any(drivers.values()):
-        names = ", ".join(survey.lines) or "none"
+        lines = ", ".join(survey.lines) or "none"
         raise DataError(
-            f"no sonar and no feed in the recording (lines: {names}); say what they are: --port NAME=DRIVER"
+            f"no sonar and no feed in the recording (lines: {lines}); say what they are: --port NAME=DRIVER"
         )
     sonar = _sonar_line(survey, drivers)
     names: dict[str, str] = {} if sonar is None else {sonar: SONAR_PORT}
