@@ -13,8 +13,6 @@ import sys
 from importlib.metadata import version
 from typing import Any, Final
 
-from drivers.tritech.head import Head
-
 from config.errors import LacunaError, PortError
 from config.schema import Sonar
 from daemon import snapshots
@@ -26,6 +24,7 @@ from daemon.recorder import Recorder
 from drivers.decoders import SONAR_PORT
 from drivers.log import LogWriter
 from drivers.records import Json
+from drivers.tritech.head import Head
 
 _LOOK_S: Final = 0.02
 _HEALTH_NS: Final = 1_000_000_000
@@ -39,7 +38,8 @@ class Acquisition:
         self._link = link
         self._clock = job.clock
         self._sonar = job.config.sonar
-        self._head: Head | None = Head(self._sonar)
+        self._head = Head(self._sonar)
+        self._is_stopped = False
         self._beams = Beams(job.config)
         self._lines = _lines(job)
         self._told_ns = 0
@@ -60,8 +60,7 @@ class Acquisition:
             t_ns, _ = self._clock.now()
             for line in self._lines.values():
                 self._serve(line, t_ns)
-            if self._head is not None:
-                self._send(self._head.tick(t_ns))
+            self._send(self._head.tick(t_ns))
             self._recorder.tick(t_ns)
             self._tell_health(t_ns)
         self._stop()
@@ -100,7 +99,7 @@ class Acquisition:
             chunk = self._recorder.chunk(line.name, "rx", data)
             for each in self._beams.push(chunk):
                 self._link.say(each)
-            if line.name == SONAR_PORT and self._head is not None:
+            if line.name == SONAR_PORT:
                 self._send(self._head.push(chunk.t_ns, data))
 
     def _send(self, data: bytes) -> None:
@@ -123,9 +122,10 @@ class Acquisition:
     def _came_back(self, line: Line) -> None:
         self._watch(line)
         self._tell_port("port_opened", line)
-        if line.name == SONAR_PORT and self._head is not None:
+        if line.name == SONAR_PORT:
             # Whatever hangs on the line now may have been without power: it is set up from the beginning.
             self._head = Head(self._sonar)
+            self._heed_stop()
 
     def _watch(self, line: Line) -> None:
         if line.descriptor is not None:
@@ -152,13 +152,17 @@ class Acquisition:
         changed = {key: value for key, value in fields.items() if key not in ("start", "stop")}
         self._sonar = Sonar.model_validate(self._sonar.model_dump() | changed)
         self._recorder.event("settings", fields)
-        if fields.get("stop") and self._head is not None:
-            self._send(self._head.stop())
-            self._head = None
-        elif fields.get("start") and self._head is None:
-            self._head = Head(self._sonar)
-        elif self._head is not None:
-            self._send(self._head.change(self._sonar))
+        if changed:
+            self._head.change(self._sonar)
+        if fields.get("start"):
+            self._is_stopped = False
+            self._head.start()
+        self._is_stopped |= bool(fields.get("stop"))
+        self._heed_stop()
+
+    def _heed_stop(self) -> None:
+        if self._is_stopped:
+            self._head.stop()
 
     def _tell_health(self, t_ns: int) -> None:
         if t_ns - self._told_ns < _HEALTH_NS * self._clock.rate:
@@ -166,7 +170,7 @@ class Acquisition:
         self._told_ns = t_ns
         ports = {name: line.health(t_ns, self._beams.counters(name)) for name, line in self._lines.items()}
         sonar: dict[str, Json] = {
-            "state": "stopped" if self._head is None else str(self._head.state),
+            "state": self._head.state,
             "pings": self._beams.pings,
             "range_m": self._sonar.range_m,
             "gain_pct": self._sonar.gain_pct,
@@ -175,8 +179,7 @@ class Acquisition:
         self._link.say(snapshots.health(*self._clock.now(), fields))
 
     def _stop(self) -> None:
-        if self._head is not None:
-            self._send(self._head.stop())
+        self._head.stop()  # it finishes the pings that it was asked for, and idles
         self._recorder.event("stopped", {"pid": os.getpid()})
         self._close_ports()
         self._recorder.close()

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from daemon.snapshots import Snapshot, degrees, number
 from drivers.records import Json
+from fill.guide import Goal
 from fill.values import Filled, Hole, Mesh
 from mapping.values import Grid, Station
 
@@ -73,6 +74,15 @@ def mesh(stamp: Stamp, surface: Mesh) -> Snapshot:
         "kind": surface.kind,
     }
     return Snapshot("mesh", *stamp, {"kinds": ["measured", "filled", "assumed"]}, {**arrays, "certainty": certainty})
+
+
+def guide(stamp: Stamp, goals: Sequence[Goal], open_ends_m: NDArray[np.float64]) -> Snapshot:
+    """Return where to station next, best first and each with its reason, and the wall ends that are still open."""
+    told: list[Json] = [
+        {"x_m": number(goal.x_m), "y_m": number(goal.y_m), "edge_m": number(goal.edge_m), "why": goal.why}
+        for goal in goals
+    ]
+    return Snapshot("guide", *stamp, {"goals": told, "open": _points(open_ends_m)})
 
 
 def _place(grid: Grid) -> dict[str, Json]:

@@ -18,11 +18,12 @@ from drivers.decoders import decoders_for
 from drivers.readings import Reading
 from drivers.records import Chunk, Event, Json, Record
 from fill.filler import Filler
+from fill.guide import guide
 from fill.surface import extrude
 from fill.values import Filled, Mesh
 from mapping.mapper import Mapper
 from mapping.scan import ScanBuilder
-from mapping.values import Scan
+from mapping.values import Scan, Station
 
 
 class Pipeline:
@@ -37,8 +38,7 @@ class Pipeline:
         self._extent = Extent(config.site.height_m)
         self._grids = GridStream()
         self._stamp: Stamp = (0, 0)
-        self._filled: Filled | None = None
-        self._mesh: Mesh | None = None
+        self._drawn: tuple[Filled, Mesh] | None = None
 
     def push(self, record: Record) -> list[Snapshot]:
         """Take the next record of the log; return what became new by it."""
@@ -59,10 +59,8 @@ class Pipeline:
     @property
     def state(self) -> MapState:
         """The map as it is."""
-        if self._filled is None or self._mesh is None:
-            self._redraw()
-        assert self._filled is not None and self._mesh is not None  # noqa: S101, PT018  (set by _redraw)
-        return MapState(self._mapper.stations, self._mapper.grid, self._filled, self._mesh)
+        filled, mesh = self._drawn or self._redraw()
+        return MapState(self._mapper.stations, self._mapper.grid, filled, mesh)
 
     def snapshots(self) -> list[Snapshot]:
         """Return the whole state as snapshots, for who begins to listen now; the next grid is a delta to this."""
@@ -85,17 +83,17 @@ class Pipeline:
         fields = event.fields
         if event.kind == "hint" and _are_numbers(fields, "dx_m", "dy_m", "sd_m"):
             self._mapper.hint(_number(fields["dx_m"]), _number(fields["dy_m"]), _number(fields["sd_m"]))
-        if event.kind == "stopped":
-            return self.finish()
         station = fields.get("station")
-        if event.kind == "drop" and isinstance(station, int) and self._mapper.drop(station):
+        is_number = isinstance(station, int) and not isinstance(station, bool)
+        if event.kind == "drop" and is_number and self._mapper.drop(int(_number(station))):
             self._redraw()
             return self._tell()
         return []
 
-    def _redraw(self) -> None:
-        self._filled = self._filler.update(self._mapper.grid)
-        self._mesh = extrude(self._filled, *self._extent.top_and_floor_m())
+    def _redraw(self) -> tuple[Filled, Mesh]:
+        filled = self._filler.update(self._mapper.grid)
+        self._drawn = filled, extrude(filled, *self._extent.top_and_floor_m())
+        return self._drawn
 
     def _tell(self, whole: bool = False) -> list[Snapshot]:
         state, stamp = self.state, self._stamp
@@ -104,7 +102,12 @@ class Pipeline:
             *self._grids.tell(stamp, state.grid, whole),
             mapshots.fill(stamp, state.filled),
             mapshots.mesh(stamp, state.mesh),
+            mapshots.guide(stamp, guide(state.filled, _places_m(state.stations)), state.filled.open_ends_m),
         ]
+
+
+def _places_m(stations: tuple[Station, ...]) -> dict[int, tuple[float, float]]:
+    return {each.scan.index: (each.pose.x_m, each.pose.y_m) for each in stations if each.status == "placed"}
 
 
 def _are_numbers(fields: dict[str, Json], *names: str) -> bool:
