@@ -17,6 +17,7 @@ COMMANDS: Final[dict[str, tuple[str, str]]] = {
     "emulate": ("tools.emulate", "an emulated vehicle on two pseudo-terminals, or recorded to a file"),
     "dashboard": ("tools.dashboard_command", "the live page in a browser"),
     "fill": ("tools.fill_map", "fill the holes of a ROS map_server map"),
+    "ports": ("tools.ports", "the serial ports of this machine"),
     "check-config": ("tools.check_config", "say every mistake of a configuration file"),
     "replay": ("tools.replay", "map recorded logs as if they were live"),
     "run": ("tools.run", "the daemon: record, map, publish"),
