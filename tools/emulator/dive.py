@@ -22,10 +22,16 @@ TRACK_NS: Final = 100_000_000
 
 @dataclass(frozen=True, slots=True)
 class DiveOptions:
-    """What may differ from dive to dive; ``stations`` limits the stops, ``sound_speed_m_s`` is the water's own."""
+    """What may differ from dive to dive.
+
+    ``stations`` limits the stops; ``sound_speed_m_s`` is the water's own.  ``mount_rad`` is the head's ahead,
+    clockwise from the bow; a head that hangs upside down turns the other way.
+    """
 
     stations: int | None = None
     sound_speed_m_s: float = 1481.0
+    mount_rad: float = 0.0
+    upside_down: bool = False
     head: HeadOptions = field(default_factory=HeadOptions)
     feed: FeedOptions = field(default_factory=FeedOptions)
     vehicle: VehicleOptions = field(default_factory=VehicleOptions)
@@ -89,4 +95,5 @@ class Dive:
         settings = self.head.settings
         self._swept += (settings.step if settings else 0) * tau / TURN
         sampling = Sampling(bin_m, sounding.bins, sounding.gain_db)
-        return self._echoes.ping(place, sounding.bearing_rad, sampling, self.head.pings)
+        turned = -sounding.bearing_rad if self.options.upside_down else sounding.bearing_rad
+        return self._echoes.ping(place, self.options.mount_rad + turned, sampling, self.head.pings)
