@@ -21,6 +21,8 @@ COMMANDS: Final[dict[str, tuple[str, str]]] = {
     "check-config": ("tools.check_config", "say every mistake of a configuration file"),
     "replay": ("tools.replay", "map recorded logs as if they were live"),
     "run": ("tools.run", "the daemon: record, map, publish"),
+    "keygen": ("tools.keygen", "make keys for a daemon that other machines reach"),
+    "demo": ("tools.demo", "an emulated dive, the real daemon on it, and the live page"),
 }
 """Name of each command, its module, and what it does in one line."""
 

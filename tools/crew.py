@@ -1,0 +1,143 @@
+"""The processes of a demo: the emulated vehicle, the daemon, the dashboard."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import signal
+import socket
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from subprocess import PIPE, Popen, TimeoutExpired
+from typing import Any, Final, Self
+
+from config.errors import LacunaError
+from tools.emulator.serve import spawn
+
+_MAP_WAIT_S: Final = 120
+_STOP_S: Final = 5.0
+
+
+class Crew:
+    """Starts and stops them; ``scratch`` takes the ports' names and the configuration, ``folder`` the log.
+
+    ZeroMQ ports are free ones, so that a demo runs beside a real daemon.
+    """
+
+    def __init__(self, scratch: Path, folder: Path, site: str, speed: float) -> None:
+        self._scratch = scratch
+        self._folder = folder
+        self._site = site
+        self._speed = speed
+        self._ports = _free_ports(3)
+        self._emulation: Popen[str] | None = None
+        self._daemon: Popen[str] | None = None
+        self._dashboard: Popen[str] | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for process in (self._dashboard, self._daemon, self._emulation):
+            if process is not None:
+                _end(process)
+
+    def start(self, seed: int, stations: int | None, truth: Path | None) -> None:
+        """Start the vehicle, and when its ports are there the daemon; raise LacunaError where one does not start."""
+        self._emulation = spawn(self._scratch / "ports", self._site, seed, self._speed, stations, truth)
+        if next(self._emulation_events(), {}).get("event") != "ready":
+            raise LacunaError("the emulated vehicle did not start; see its message above")
+        path = self._scratch / "demo.toml"
+        path.write_text(self._configuration(), encoding="utf-8")
+        words = [
+            "run",
+            "--config",
+            str(path),
+            "--json",
+            "--clock-rate",
+            str(self._speed),
+            "--map-wait",
+            str(_MAP_WAIT_S),
+        ]
+        # A session of its own keeps Ctrl-C from it: the demo stops its processes in order.
+        self._daemon = Popen(_lacuna(words), stdout=PIPE, text=True, start_new_session=True)  # noqa: S603  (our own)
+
+    def open_dashboard(self) -> str:
+        """Start the dashboard, which opens the browser; return its address."""
+        snapshots, requests, page = self._ports
+        words = ["dashboard", "--connect", f"tcp://127.0.0.1:{snapshots}", "--requests", f"tcp://127.0.0.1:{requests}"]
+        words += ["--port", str(page), "--open"]
+        self._dashboard = Popen(_lacuna(words), stdout=PIPE, text=True, start_new_session=True)  # noqa: S603  (our own)
+        return f"http://127.0.0.1:{page}/"
+
+    def events(self) -> Iterator[dict[str, Any]]:
+        """Yield what the vehicle does: ``station``, then ``done``; raise LacunaError where the daemon has ended."""
+        for event in self._emulation_events():
+            yield event
+            self._check_daemon()
+        self._check_daemon()
+
+    def stop(self) -> dict[str, Any]:
+        """Stop the daemon in order, once the map has read the log; return how it ended."""
+        if self._daemon is None:
+            return {}
+        self._daemon.send_signal(signal.SIGTERM)
+        out, _ = self._daemon.communicate(timeout=_MAP_WAIT_S + _STOP_S)
+        if self._daemon.returncode:
+            raise LacunaError(f"the daemon ended with code {self._daemon.returncode}; see its message above")
+        outcome: dict[str, Any] = json.loads(out)
+        return outcome
+
+    def _check_daemon(self) -> None:
+        if self._daemon is not None and self._daemon.poll() is not None:
+            raise LacunaError(f"the daemon ended with code {self._daemon.returncode}; see its message above")
+
+    def _emulation_events(self) -> Iterator[dict[str, Any]]:
+        if self._emulation is None or self._emulation.stdout is None:
+            return
+        # readline, not iteration: a file's iterator reads ahead and would hold events back.
+        while line := self._emulation.stdout.readline():
+            event: dict[str, Any] = json.loads(line)
+            yield event
+
+    def _configuration(self) -> str:
+        snapshots, requests, _ = self._ports
+        ports = self._scratch / "ports"
+        return "\n".join(
+            (
+                "[site]",
+                f"name = {json.dumps(self._site)}",
+                "[sonar]",
+                f"port = {json.dumps(str(ports / 'sonar'))}",
+                "[[feed]]",
+                f"port = {json.dumps(str(ports / 'feed'))}",
+                "[publish]",
+                f"port = {snapshots}",
+                f"request_port = {requests}",
+                "[recording]",
+                f"folder = {json.dumps(str(self._folder))}",
+                "",
+            )
+        )
+
+
+def _lacuna(words: list[str]) -> list[str]:
+    return [sys.executable, "-P", "-m", "tools.cli", *words]
+
+
+def _free_ports(count: int) -> list[int]:
+    with contextlib.ExitStack() as stack:
+        probes = [stack.enter_context(socket.socket()) for _ in range(count)]
+        for probe in probes:
+            probe.bind(("127.0.0.1", 0))
+        return [int(probe.getsockname()[1]) for probe in probes]
+
+
+def _end(process: Popen[str]) -> None:
+    process.terminate()
+    try:
+        process.communicate(timeout=_STOP_S)
+    except TimeoutExpired:
+        process.kill()
+        process.communicate()
