@@ -180,7 +180,7 @@ def _scan(index: int) -> Scan:
 def health(t_ns: int, sonar_state: str = "open") -> Snapshot:
     """Two ports, one of which is silent; a map that is a little late."""
     ports: dict[str, Any] = {
-        "sonar": {"state": "open", "rx_bytes_s": 8120.0, "pings_s": 39.8, "last_s": 0.02, "lost": 0, "skipped": 3},
+        "sonar": {"state": sonar_state, "rx_bytes_s": 8120.0, "pings_s": 39.8, "last_s": 0.02, "lost": 0, "skipped": 3},
         "pilot": {"state": "open", "rx_bytes_s": 0.0, "readings_s": 0.0, "last_s": 41.0, "lost": 1, "skipped": 0},
     }
     fields: dict[str, Any] = {"ports": ports, "map": {"lag_s": 0.4, "records": 12804}, "disk_free_mib": 21480.0}
@@ -194,6 +194,7 @@ class FakeDaemon:
         self.port = port
         self.heard: list[Request] = []
         self.silent = threading.Event()
+        self.sonar_state = "open"
         self._ended = threading.Event()
         self._pings_hz = pings_hz
         self._session = session
@@ -228,7 +229,7 @@ class FakeDaemon:
                 number += 1
                 if time.monotonic() - beaten > 1:
                     beaten = time.monotonic()
-                    self._say(health(number))
+                    self._say(health(number, self.sonar_state))
                 while self._more:
                     self._say(self._more.popleft())
 

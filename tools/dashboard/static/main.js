@@ -159,7 +159,7 @@ const KEYS = {
 };
 
 function key(event) {
-  if (event.ctrlKey || event.altKey || event.metaKey || event.target.matches("input, select, textarea")) return;
+  if (event.ctrlKey || event.altKey || event.metaKey || event.target.matches("input:not([type=checkbox], [type=range]), select, textarea")) return;
   KEYS[event.key.toLowerCase()]?.();
 }
 

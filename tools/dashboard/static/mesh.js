@@ -14,6 +14,12 @@ const MOST_SEAMS = 20000;
 const MIN_PAUSE_MS = 2500;
 const AXIS = { color: "#92a0ac", gridcolor: "#2b343d", zerolinecolor: "#3b4753", backgroundcolor: "#12171c", showbackground: true, title: { font: { size: 12 } } };
 
+// Only buttons that turn the view: none that would send the mesh to somebody else's machine.
+const CONFIG = {
+  responsive: true, displaylogo: false, plotlyServerURL: "",
+  modeBarButtons: [["orbitRotation", "tableRotation", "resetCameraDefault3d"]],
+};
+
 export class MeshView {
   constructor(box, note) {
     this.box = box;
@@ -57,7 +63,7 @@ export class MeshView {
     try {
       this.plotly ??= await loadPlotly();
       this.note.hidden = true;
-      await this.plotly.react(this.box, this.traces(), layout(), { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["toImage"] });
+      await this.plotly.react(this.box, this.traces(), layout(), CONFIG);
     } catch (error) {
       this.note.hidden = false;
       this.note.textContent = `The mesh cannot be drawn here: ${error.message}`;

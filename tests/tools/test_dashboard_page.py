@@ -1,0 +1,312 @@
+"""What people see: the page in a real Chromium, looked at by its words and its pixels."""
+
+from __future__ import annotations
+
+import io
+import shutil
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+from fake_daemon import FakeDaemon
+from live_page import Dashboard, dashboard, free_port
+from numpy.typing import NDArray
+from PIL import Image
+from playwright.sync_api import Browser, Locator, Page, Request, expect, sync_playwright
+
+from daemon.snapshots import Snapshot
+
+FLAGS = [
+    "--headless=new", "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--no-first-run",
+    "--disable-component-update", "--disable-sync", "--disable-quic",
+]  # fmt: skip
+WALL, FREE, UNKNOWN = (11, 15, 19), (207, 216, 222), (89, 99, 109)
+STONE = (178, 170, 158)
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Browser]:
+    path = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if path is None:
+        pytest.skip("no Chromium on this machine: apt-get install chromium")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=FLAGS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="module")
+def daemon() -> Iterator[FakeDaemon]:
+    served = FakeDaemon(free_port())
+    yield served
+    served.close()
+
+
+@pytest.fixture(scope="module")
+def served(daemon: FakeDaemon) -> Iterator[Dashboard]:
+    with dashboard(daemon.port) as running:
+        yield running
+
+
+@pytest.fixture
+def page(chromium: Browser, served: Dashboard) -> Iterator[Page]:
+    """The page, watched: an error in it, or a request to anywhere else, fails the test."""
+    wrong: list[str] = []
+    page = chromium.new_page(viewport={"width": 1366, "height": 650})
+    page.on("pageerror", lambda error: wrong.append(f"error: {error}"))
+    page.on("console", lambda said: wrong.append(f"console: {said.text}") if said.type == "error" else None)
+
+    def watch(request: Request) -> None:
+        if not request.url.startswith((served.url, "data:", "blob:")):
+            wrong.append(f"request to {request.url}")
+
+    page.on("request", watch)
+    page.goto(served.url)
+    expect(page.locator("#link-word")).to_have_text("live")
+    expect(page.locator("#heading")).not_to_have_text("–")
+    yield page
+    page.close()
+    assert wrong == []
+
+
+def picture(of: Locator) -> NDArray[np.uint8]:
+    return np.asarray(Image.open(io.BytesIO(of.screenshot())).convert("RGB"))
+
+
+def near(pixels: NDArray[np.uint8], colour: tuple[int, int, int], within: int = 12) -> NDArray[np.bool_]:
+    return np.asarray((np.abs(pixels.astype(int) - colour) <= within).all(axis=-1))
+
+
+def until(seen: Callable[[], bool], seconds: float = 20) -> None:
+    end = time.monotonic() + seconds
+    while not seen():
+        assert time.monotonic() < end, "it is not to be seen"
+        time.sleep(0.1)
+
+
+def on_plan(page: Page, x_m: float, y_m: float) -> tuple[int, int]:
+    """Pixel of a place, worked out from the plan's own words under the pointer at two corners."""
+    box = page.locator("#plan").bounding_box()
+    assert box is not None
+
+    def place(px: float, py: float) -> tuple[float, float]:
+        page.mouse.move(box["x"] + px, box["y"] + py)
+        page.wait_for_timeout(120)
+        east, north = page.locator("#plan-readout").inner_text().split("·")[:2]
+        return float(east.split()[0]), float(north.split()[0])
+
+    (x0, y0), (x1, y1) = place(10, 100), place(510, 400)
+    return round(10 + 500 * (x_m - x0) / (x1 - x0)), round(100 + 300 * (y_m - y0) / (y1 - y0))
+
+
+def test_heading_depth_and_settings_stand_as_numbers(page: Page) -> None:
+    expect(page.locator("#depth")).to_have_text("1.37m")
+    expect(page.locator("#range")).to_have_text("8.0m")
+    expect(page.locator("#gain")).to_have_text("45%")
+    assert 37 <= int(page.locator("#heading").inner_text().removesuffix("°")) <= 47
+    expect(page.locator("#site")).to_have_text("keyhole")
+    assert page.title() == "keyhole · lacuna"
+
+
+def test_plan_shows_wall_water_unknown_and_fill_where_they_are(page: Page) -> None:
+    def colour(x_m: float, y_m: float) -> NDArray[np.uint8]:
+        px, py = on_plan(page, x_m, y_m)
+        return picture(page.locator("#plan"))[py - 1 : py + 2, px - 1 : px + 2]
+
+    assert near(colour(-3.0, 1.0), WALL).all()
+    assert near(colour(0.5, -1.2), FREE).all()
+    assert near(colour(-3.6, 0.5), UNKNOWN).all()
+    px, py = on_plan(page, 4.1, 0.0)
+    fill = picture(page.locator("#plan"))[py - 3 : py + 4, px - 12 : px + 13]
+    assert not near(fill, WALL).any(), "a fill must not look measured"
+    assert 0.1 < _orange(fill).mean() < 0.9, "a fill is hatched"
+
+
+def test_a_surer_fill_is_stronger(page: Page) -> None:
+    def strength(x_m: float, y_m: float) -> float:
+        px, py = on_plan(page, x_m, y_m)
+        fill = picture(page.locator("#plan"))[py - 4 : py + 5, px - 8 : px + 9].astype(float)
+        return float(255 - np.percentile(fill[..., 2], 10))
+
+    assert strength(4.1, 0.0) > strength(-2.0, 3.1) + 30
+
+
+def test_the_pointer_tells_coordinates_evidence_fills_and_stations(page: Page) -> None:
+    def under(x_m: float, y_m: float) -> str:
+        px, py = on_plan(page, x_m, y_m)
+        page.locator("#plan").hover(position={"x": px, "y": py})
+        page.wait_for_timeout(150)
+        return page.locator("#plan-readout").inner_text()
+
+    assert "open water, measured, occupied 10 %" in under(0.5, -1.2)
+    assert "filled in, certainty" in under(4.1, 0.0)
+    assert "both walls are straight" in under(4.1, 0.0)
+    assert "station 2 placed" in under(1.6, 1.9)
+    assert "closes the hole" in under(-2.2, 2.0)
+
+
+def test_an_unplaced_station_says_why(page: Page) -> None:
+    expect(page.locator("#outside")).to_contain_text(
+        "Station 4 unplaced: two places fit equally well, 3.1 m apart along 090°"
+    )
+    expect(page.locator("#outside")).to_contain_text("Station 3 doubtful")
+
+
+def test_the_sonar_shows_the_wall_where_it_is(page: Page) -> None:
+    page.locator("#north-up").click()
+    page.locator("#palette").select_option("grey")
+
+    def wall_seen() -> bool:
+        pixels = picture(page.locator("#polar")).astype(int).max(axis=-1)
+        centre = len(pixels) / 2
+        south = 2.0 / 8.0 * (centre - 22)  # the wall 2 m south of the vehicle
+        column = pixels[:, round(centre) - 12 : round(centre) + 13].mean(axis=1)
+        here = slice(round(centre + south) - 4, round(centre + south) + 5)
+        return bool(column[here].max() > 120 > 3 * np.median(column[round(centre + 20) : round(centre + south) - 10]))
+
+    until(wall_seen)
+
+
+def test_the_pointer_tells_range_and_bearing(page: Page) -> None:
+    box = page.locator("#polar").bounding_box()
+    assert box is not None
+    centre = box["width"] / 2
+    page.locator("#north-up").click()
+    page.locator("#polar").hover(position={"x": centre + (centre - 22) / 2, "y": centre})
+    said = page.locator("#polar-readout").inner_text()
+    assert said.startswith("4.0")
+    assert "direction 090°" in said
+    page.locator("#heading-up").click()
+    page.locator("#polar").hover(position={"x": centre, "y": centre - (centre - 22) / 4})
+    assert "bearing 000°" in page.locator("#polar-readout").inner_text()
+
+
+def test_mesh_in_three_dimensions_and_measured_only(page: Page) -> None:
+    page.keyboard.press("2")
+    until(lambda: near(picture(page.locator("#mesh")), STONE, 30).mean() > 0.01, 40)
+    assert orange_share(page) > 0.005
+    page.locator("#measured-only").check()
+    until(lambda: orange_share(page) < 0.0005)
+    expect(page.locator(".modebar-btn")).to_have_count(3)  # none that would upload the mesh
+    expect(page.locator("#legend-floor")).to_be_visible()
+    page.keyboard.press("1")
+    expect(page.locator("#plan")).to_be_visible()
+
+
+def orange_share(page: Page) -> float:
+    return float(_orange(picture(page.locator("#mesh"))).mean())
+
+
+def _orange(pixels: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    red, blue = pixels[..., 0].astype(int), pixels[..., 2].astype(int)
+    return np.asarray(red > blue + 70)
+
+
+def test_ports_have_a_lamp_and_a_word(page: Page) -> None:
+    sonar, pilot = page.locator("[data-port=sonar]"), page.locator("[data-port=pilot]")
+    expect(sonar).to_have_attribute("data-lamp", "green")
+    expect(sonar).to_contain_text("39.8 pings/s")
+    expect(pilot).to_have_attribute("data-lamp", "yellow")
+    expect(pilot).to_contain_text("silent for 41 s")
+    expect(page.locator("#lag")).to_have_text("map 0.4 s behind")
+    expect(page.locator("#disk")).to_have_text("21.0 GiB free")
+
+
+def test_a_lost_port_turns_red_and_events_are_told(page: Page, daemon: FakeDaemon) -> None:
+    daemon.say(Snapshot("event", 1, time.time_ns(), {"kind": "port_lost", "fields": {"port": "sonar"}}))
+    daemon.sonar_state = "lost"
+    expect(page.locator("[data-port=sonar]")).to_have_attribute("data-lamp", "red")
+    expect(page.locator("[data-port=sonar]")).to_contain_text("lost")
+    daemon.sonar_state = "open"
+    expect(page.locator("#events li").first).to_contain_text("port lost, port sonar")
+    daemon.say(Snapshot("event", 2, time.time_ns(), {"kind": "note", "fields": {"text": "<b>amphora</b>"}}))
+    expect(page.locator("#events li").first).to_contain_text("note, <b>amphora</b>")
+    assert page.locator("#events b").count() == 0
+
+
+def test_commands_reach_the_daemon_and_its_refusal_is_shown(page: Page, daemon: FakeDaemon) -> None:
+    page.get_by_label("Text of a mark or a note").fill("amphora")
+    page.get_by_role("button", name="Mark").click()
+    expect(page.locator("#answer")).to_have_text("Mark: done.")
+    assert (daemon.heard[-1].do, daemon.heard[-1].fields) == ("mark", {"text": "amphora"})
+    page.get_by_label("Moved east").fill("1.5")
+    page.locator("#form-hint [name=dy_m]").fill("-0.5")
+    page.get_by_role("button", name="Hint").click()
+    expect(page.locator("#answer")).to_have_text("Hint: done.")
+    assert daemon.heard[-1].fields["dy_m"] == -0.5
+    page.locator("#form-drop select").select_option("4")
+    page.get_by_role("button", name="Drop").click()
+    expect(page.locator("#answer")).to_have_text("Drop station 4: done.")
+    assert daemon.heard[-1].fields == {"station": 4}
+    page.locator("#form-sonar [name=range_m]").fill("200")
+    page.get_by_role("button", name="Set").click()
+    expect(page.locator("#answer")).to_have_text("Sonar: the head reaches 100 m. Ask for less.")
+    expect(page.locator("#answer")).to_have_class("answer bad")
+
+
+def test_a_silent_daemon_is_said_and_forgiven(page: Page, daemon: FakeDaemon) -> None:
+    daemon.silent.set()
+    expect(page.locator("#banner")).to_contain_text("No data for", timeout=10_000)
+    expect(page.locator("#link")).to_have_attribute("data-lamp", "yellow")
+    daemon.silent.clear()
+    expect(page.locator("#banner")).to_be_hidden(timeout=10_000)
+    expect(page.locator("#link")).to_have_attribute("data-lamp", "green")
+
+
+def test_everything_is_reached_by_keyboard_and_has_a_name(page: Page) -> None:
+    names: list[str] = []
+    for _ in range(40):
+        page.keyboard.press("Tab")
+        names.append(
+            page.evaluate(
+                "document.activeElement.id || document.activeElement.name || document.activeElement.innerText"
+            )
+        )
+    for wanted in (
+        "heading-up",
+        "north-up",
+        "polar",
+        "palette",
+        "floor",
+        "tab-plan",
+        "fit",
+        "plan",
+        "text",
+        "Mark",
+        "range_m",
+        "save",
+    ):
+        assert wanted in names, names
+    unnamed = """[...document.querySelectorAll('button,input,select,canvas')]
+        .filter(e => !(e.labels?.length || e.ariaLabel || e.innerText)).map(e => e.outerHTML)"""
+    assert page.evaluate(unnamed) == []
+
+
+def test_nothing_is_cut_off_on_a_small_laptop(page: Page) -> None:
+    assert page.evaluate("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]") == [1366, 650]
+    outside = """[...document.querySelectorAll('main button, main input, dd')]
+        .filter(e => e.offsetParent && e.getBoundingClientRect().right > 1366)"""
+    assert page.evaluate(f"{outside}.length") == 0
+
+
+def test_a_new_session_clears_the_page_and_a_lost_server_is_said(chromium: Browser) -> None:
+    port = free_port()
+    first = FakeDaemon(port, "session-one")
+    page = chromium.new_page(viewport={"width": 1366, "height": 650})
+    try:
+        with dashboard(port) as served:
+            page.goto(served.url)
+            expect(page.locator("#session")).to_have_text("session session-")
+            first.say(Snapshot("event", 1, time.time_ns(), {"kind": "mark", "fields": {}}))
+            expect(page.locator("#events li")).to_have_count(1)
+            first.close()
+            first = FakeDaemon(port, "again-two")
+            expect(page.locator("#session")).to_have_text("session again-tw", timeout=15_000)
+            expect(page.locator("#events li")).to_have_count(0)
+            expect(page.locator("#link-word")).to_have_text("live")
+        expect(page.locator("#banner")).to_contain_text("lost", timeout=10_000)
+        expect(page.locator("#link")).to_have_attribute("data-lamp", "red")
+    finally:
+        page.close()
+        first.close()
