@@ -15,6 +15,7 @@ from drivers.tritech.settings import head_command, matches
 from drivers.tritech.states import SECOND_NS, STEPS, TRANSITIONS, Event, Sends, State, event_of
 
 _HUSH_NS: Final = 12 * SECOND_NS
+_FLAGGED_PINGS: Final = 2
 _OLD_PINGS: Final = 4
 _RESENDS: Final = 2
 _LOSSES: Final = 3
@@ -45,7 +46,7 @@ class Head:
         self._tries = 0
         self._heard_ns = 0
         self._refused = False
-        self._old = self._resent = self._losses = 0
+        self._old = self._resent = self._losses = self._flagged = 0
 
     @property
     def state(self) -> str:
@@ -142,7 +143,11 @@ class Head:
 
     def _judge(self, data: HeadData) -> Event | None:
         """Compare a ping with the settings sent; a few old ones may still be on their way after a change."""
-        if data.status & _LOST:
+        self._flagged = self._flagged + 1 if data.status & _LOST else 0
+        if self._flagged:
+            # A head repeats this until it is set again; noise on the line does not.
+            if self._flagged < _FLAGGED_PINGS:
+                return None
             self._losses += self._state is State.SCANNING
             return Event.LOST
         if matches(data, self._command.parameters):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import random
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -53,6 +54,25 @@ def test_real_stream(shared_data: Path) -> None:
         pieces = [(9, stream[i : i + size]) for i in range(0, len(stream), size)]
         again, same = decode(pieces, Sonar(sound_speed_m_s=1475.0))
         assert ([key(ping) for ping in again], same) == (whole, counters)
+
+
+def test_undamaged_pings_of_a_damaged_real_stream(shared_data: Path) -> None:
+    stream = (shared_data / "sonar" / "micron_dst_stream_20171102.bin").read_bytes()
+    whole = [key(ping) for ping in decode([(0, stream)])[0]]
+    generator = random.Random(794)
+    for _ in range(3):
+        damaged = bytearray(stream)
+        hurt = set()
+        for _ in range(8):
+            at = generator.randrange(24, len(stream) - 40)
+            hurt.add((at - 24) // 839)
+            damaged[at] = generator.randrange(256)
+        cut = generator.randrange(24, len(stream) - 40)
+        del damaged[cut : cut + 7]
+        hurt |= {(cut - 24) // 839, (cut + 6 - 24) // 839}
+        left = [ping for number, ping in enumerate(whole) if number not in hurt]
+        found = iter(key(ping) for ping in decode([(0, bytes(damaged))])[0])
+        assert all(ping in found for ping in left)
 
 
 @pytest.mark.parametrize(

@@ -176,6 +176,18 @@ def test_requests_do_not_pile_up() -> None:
     assert len(single.scripted.queue) <= 1
 
 
+def test_the_next_request_goes_out_while_a_ping_is_still_to_come() -> None:
+    head = Head(SONAR)
+    head.push(SECOND, encode(Alive(READY)))
+    ping = ScriptedHead().ping(head_command(SONAR).parameters)
+    head.push(2 * SECOND, encode(VersionData(1)))
+    head.push(3 * SECOND, encode(user_block()))
+    ask = commands.encode_command(commands.SendData())
+    assert head.push(4 * SECOND, encode(Alive(READY))) == ask
+    assert [head.push(4 * SECOND + i, ping) for i in range(1, 7)] == [ask, b"", ask, b"", ask, b""]
+    assert head.push(5 * SECOND, ping + ping) == ask
+
+
 def test_nothing_is_sent_before_there_was_time_to_listen() -> None:
     head = Head(SONAR)
     assert head.tick(5 * SECOND) == b""
@@ -221,6 +233,17 @@ def test_power_loss_is_answered_with_the_settings() -> None:
     assert line.states == ["scanning", "setting", "scanning"]
     assert line.scripted.count(commands.HeadCommand) == 2
     assert line.scripted.count(commands.ReBoot) == 0
+
+
+def test_one_ping_that_tells_of_a_loss_may_be_noise() -> None:
+    line = Line().run(10)
+    line.scripted.status = HeadStatus(0x11)
+    noisy = line.scripted.ping(head_command(SONAR).parameters)
+    line.scripted.status = HeadStatus.FULL_RANGE_8_BIT
+    for _ in range(5):
+        line.head.push(line.t_ns, noisy)
+        line.run(1)
+    assert line.scripted.count(commands.HeadCommand) == 1
 
 
 def test_a_motor_that_stays_lost_reboots_the_head() -> None:
