@@ -119,6 +119,7 @@ class Survey:
             self.pieces += 1
             self.first = self.first or each
             self.earliest_t_ns = min(self.earliest_t_ns, each.t_ns)
-            probe = self.lines.setdefault(each.line, LineProbe(each.line, baud))
+            if each.line not in self.lines:
+                self.lines[each.line] = LineProbe(each.line, baud)
             if each.direction == "rx":
-                probe.push(each.t_ns, each.data)
+                self.lines[each.line].push(each.t_ns, each.data)
