@@ -19,7 +19,7 @@ PULSE_M: Final = 0.018
 
 # Two-way skirts and side lobes beside the main lobe's peak: degrees off the axis, dB.
 _LOBES_DEG: Final = (0.0, 3.0, 5.0, 10.0, 20.0, 30.0, 45.0, 180.0)
-_LOBES_DB: Final = (-9.0, -11.0, -15.0, -19.0, -28.0, -38.0, -50.0, -56.0)
+_LOBES_DB: Final = (-9.0, -11.0, -15.0, -19.0, -28.0, -42.0, -54.0, -60.0)
 _RIPPLE_DEG: Final = 4.3
 
 

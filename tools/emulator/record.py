@@ -10,17 +10,12 @@ from typing import Final
 
 from config.errors import LogError
 from config.schema import Sonar
-from drivers.tritech.commands import SendBBUser, SendData, SendVersion, encode_command
-from drivers.tritech.framing import Deframer
-from drivers.tritech.headdata import HeadData
-from drivers.tritech.messages import Alive, BBUserData, HeadInf, VersionData, decode
-from drivers.tritech.settings import head_command
+from drivers.tritech.head import Head
 from tools.emulator.dive import Dive
 
 TICK_NS: Final = 10_000_000
 """How often the host reads its ports: 10 ms, as a kernel hands bytes over."""
 
-_ASK_AGAIN_NS: Final = 1_000_000_000
 _GIVE_UP_NS: Final = 4 * 3600 * 1_000_000_000
 
 
@@ -35,8 +30,11 @@ class Piece:
 
 
 def record(dive: Dive, sonar: Sonar | None = None) -> Iterator[Piece]:
-    """Yield what goes over both ports (``sonar`` and ``feed``) until the dive is done, or after four hours."""
-    host = _Host(sonar or Sonar())
+    """Yield what goes over both ports (``sonar`` and ``feed``) until the dive is done, or for four hours.
+
+    The host is the one that drives real heads; ``sonar`` is its configuration.
+    """
+    host = Head(sonar or Sonar())
     t_ns = 0
     while not dive.done and t_ns < _GIVE_UP_NS:
         t_ns += TICK_NS
@@ -45,7 +43,7 @@ def record(dive: Dive, sonar: Sonar | None = None) -> Iterator[Piece]:
             yield Piece(t_ns, "feed", "rx", from_feed)
         if from_sonar:
             yield Piece(t_ns, "sonar", "rx", from_sonar)
-        if asked := host.step(t_ns, from_sonar):
+        if asked := host.push(t_ns, from_sonar) if from_sonar else host.tick(t_ns):
             yield Piece(t_ns, "sonar", "tx", asked)
             dive.push(t_ns, asked)
         dive.advance(t_ns)
@@ -66,40 +64,3 @@ def write_jsonl(pieces: Iterable[Piece], path: Path) -> int:
     except OSError as error:
         raise LogError(f"cannot write {path}: {error.strerror}; choose another file or free some space") from None
     return count
-
-
-class _Host:
-    """The least that makes a head scan: wait until it is centred, greet it, set it, keep asking."""
-
-    def __init__(self, sonar: Sonar) -> None:
-        self._sonar = sonar
-        self._deframer = Deframer(sonar.baud)
-        self._stage = "centring"
-        self._asked_ns = 0
-        self._replies = 0
-
-    def step(self, t_ns: int, data: bytes) -> bytes:
-        out = bytearray()
-        for frame in self._deframer.push(t_ns, data):
-            match decode(frame):
-                case Alive(info) if self._stage == "centring" and HeadInf.CENTRED in info:
-                    self._stage = "greeting"
-                    out += encode_command(SendVersion(), self._sonar.node)
-                case VersionData():
-                    out += encode_command(SendBBUser(), self._sonar.node)
-                case BBUserData():
-                    out += encode_command(head_command(self._sonar), self._sonar.node)
-                case Alive(info) if self._stage == "greeting" and HeadInf.NO_PARAMETERS not in info:
-                    self._stage = "asking"
-                    out += self._ask(t_ns)
-                case HeadData():
-                    self._replies += 1
-                    if self._replies % 2 == 0:
-                        out += self._ask(t_ns)
-        if self._stage == "asking" and t_ns - self._asked_ns > _ASK_AGAIN_NS:
-            out += self._ask(t_ns)
-        return bytes(out)
-
-    def _ask(self, t_ns: int) -> bytes:
-        self._asked_ns = t_ns
-        return encode_command(SendData(), self._sonar.node)

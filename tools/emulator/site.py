@@ -31,7 +31,7 @@ class Material:
     texture_db: float
 
 
-TILE: Final = Material(backscatter_db=0.0, mirror_db=-3.5, corner_db=8.0, texture_db=3.5)
+TILE: Final = Material(backscatter_db=0.0, mirror_db=-5.0, corner_db=8.0, texture_db=3.5)
 ROCK: Final = Material(backscatter_db=0.0, mirror_db=-6.5, corner_db=2.0, texture_db=4.5)
 
 
@@ -126,14 +126,14 @@ def keyhole() -> Site:
     passage = [(2.75, half), (6.7, half + 0.1), (6.75, -half), (2.75, -half)]
     wall = rock_cut(chamber + passage, np.random.default_rng(2011))
     stops = (
+        _stop(-1.1, -1.1, 350.0),
         _stop(-0.9, 0.3, 20.0),
         _stop(0.5, 1.2, 75.0),
         _stop(0.6, -0.9, 130.0, depth_m=1.4),
         _stop(1.9, 0.1, 95.0, depth_m=1.4),
         _stop(3.3, 0.1, 88.0, depth_m=1.5),
         _stop(4.9, 0.0, 85.0, depth_m=1.5),
-        _stop(1.2, 0.2, 265.0),
-        _stop(-1.1, -1.1, 230.0),
+        _stop(3.0, -0.1, 268.0, depth_m=1.4),
     )
     return Site("keyhole", (wall,), floor_m=2.6, stops=stops)
 
