@@ -84,7 +84,7 @@ def polar_evidence(scan: Scan, returns: Returns, beam_rad: float, cell_m: float)
     ranges = (np.arange(math.ceil((heard_m + 6.0 * cell_m) / step_m)) + 0.5) * step_m
     sd = np.hypot(fan.sd_m, 0.4 * cell_m)[:, None]
     away = (ranges[None, :] - fan.range_m[:, None]) / sd
-    peak = OCCUPIED_LOG_ODDS * np.minimum(1.0, np.sqrt(cell_m / sd))
+    peak = OCCUPIED_LOG_ODDS * np.minimum(1.0, cell_m / sd)
     occupied = np.where(np.abs(away) < 3.5, peak * np.exp(-0.5 * away**2), 0.0)
     clear_m = np.where(np.isfinite(fan.range_m), np.fmin(fan.free_m, fan.range_m - 2.0 * sd[:, 0]), fan.free_m)
     free = np.where(ranges[None, :] < clear_m[:, None], FREE_LOG_ODDS, 0.0)

@@ -87,7 +87,7 @@ class Likelihood:
         self._scan, self._reference, self._prior = scan, reference, prior
         self._tables: dict[float, tuple[NDArray[np.float32], NDArray[np.float32]]] = {}
         own, other = len(scan.points.xy_m), len(reference.points.xy_m)
-        self.witnesses = min(WITNESSES, own / POINTS_A_WITNESS)
+        self.witnesses = min(WITNESSES, float(scan.points.trust.sum()) / POINTS_A_WITNESS)
         # A map has more walls than one scan can see; those it does not see are neutral and must not dilute the others.
         self._share = max(1.0, other / max(own, 1))
 

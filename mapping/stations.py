@@ -42,7 +42,7 @@ def sight_of(scan: Scan, returns: Returns, config: Map) -> Sight:
     """Make a scan ready for registration and for the grid."""
     evidence = polar_evidence(scan, returns, math.radians(config.beam_deg), config.cell_m)
     alone = grids.render([(Pose(0.0, 0.0, 0.0), evidence)], config)
-    points = points_of(wall_points(scan.bearing_rad, returns))
+    points = points_of(*wall_points(scan.bearing_rad, returns))
     return Sight(scan, evidence, View(points, field_of(alone)), alone)
 
 
@@ -149,8 +149,9 @@ class Stations:
         xy = np.concatenate([to_map(self._stations[k].pose, self._sights[k].view.points.xy_m) for k in placed])
         own = sight.view.points.xy_m
         reach = prior.reach_m * (3.0 if prior.gaussian else 1.0) + float(np.hypot(own[:, 0], own[:, 1]).max()) + 1.0
+        trust = np.concatenate([self._sights[k].view.points.trust for k in placed])
         near = np.hypot(xy[:, 0] - prior.x_m, xy[:, 1] - prior.y_m) < reach
-        return View(points_of(xy[near]), field_of(grids.render(evidence, self._config)))
+        return View(points_of(xy[near], trust[near]), field_of(grids.render(evidence, self._config)))
 
     def _judge(self, i: int, match: Match) -> Station:
         scan = self._sights[i].scan

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
-from mapping.values import FREE, OCCUPIED, Grid, Pose, Returns
+from mapping.values import FREE, Grid, Pose, Returns
 
 THIN_M = 0.1
 """One point per square of this side: walls near a station are sampled more densely than others."""
@@ -22,15 +22,20 @@ HIT_FREE = 0.05
 """Odds of a point in water that was seen free, against 1 at a wall ..."""
 HIT_UNKNOWN = 0.3
 """... and of one where nothing is known: neutral."""
+TRUSTED_SD_M = 0.08
+"""Returns with a larger standard deviation count less."""
+WALL_LOG_ODDS = 0.4
+"""Cells above this are walls to registration: it may use vague ones too."""
 PAD_M = 0.6
 """Unknown border around a field."""
 
 
 @dataclass(frozen=True, slots=True)
 class Points:
-    """Wall points ``(n, 2)`` float64 (x, y), weights ``(n,)`` of sum 1, wall normals ``(n,)`` in [0, pi) or nan."""
+    """Wall points ``(n, 2)`` float64 (x, y), their trust ``(n,)``, weights of sum 1, normals in [0, pi) or nan."""
 
     xy_m: NDArray[np.float64]
+    trust: NDArray[np.float64]
     weight: NDArray[np.float64]
     normal_rad: NDArray[np.float64]
 
@@ -60,11 +65,12 @@ class View:
     field: Field
 
 
-def wall_points(bearing_rad: NDArray[np.float64], returns: Returns) -> NDArray[np.float64]:
-    """Places of the returns ``(n, 2)`` in the vehicle's axes: x right, y ahead."""
+def wall_points(bearing_rad: NDArray[np.float64], returns: Returns) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Places of the returns ``(n, 2)`` in the vehicle's axes (x right, y ahead), and their trust ``(n,)``, 0 to 1."""
     seen = np.isfinite(returns.range_m)
     r, b = returns.range_m[seen], bearing_rad[seen]
-    return np.stack([r * np.sin(b), r * np.cos(b)], axis=1)
+    trust = np.minimum(1.0, TRUSTED_SD_M / returns.sd_m[seen])
+    return np.stack([r * np.sin(b), r * np.cos(b)], axis=1), trust
 
 
 def to_map(pose: Pose, xy_m: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -75,16 +81,15 @@ def to_map(pose: Pose, xy_m: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.stack([x, y], axis=1)
 
 
-def thin(xy_m: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Keep one point, the mean, per square of ``THIN_M``; in order of the squares."""
+def thin(xy_m: NDArray[np.float64], trust: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Keep one point, the mean, per square of ``THIN_M`` with its mean trust; in order of the squares."""
     if not len(xy_m):
-        return xy_m
+        return xy_m, trust
     squares = np.floor(xy_m / THIN_M).astype(np.int64)
     _, member, count = np.unique(squares, axis=0, return_inverse=True, return_counts=True)
     member = member.reshape(-1)
-    x = np.bincount(member, xy_m[:, 0]) / count
-    y = np.bincount(member, xy_m[:, 1]) / count
-    return np.stack([x, y], axis=1)
+    x, y, t = (np.bincount(member, v) / count for v in (xy_m[:, 0], xy_m[:, 1], trust))
+    return np.stack([x, y], axis=1), t
 
 
 def normals(xy_m: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -100,28 +105,28 @@ def normals(xy_m: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where((count >= 3) & longish, (along + 0.5 * math.pi) % math.pi, np.nan)
 
 
-def even_weights(normal_rad: NDArray[np.float64]) -> NDArray[np.float64]:
+def even_weights(normal_rad: NDArray[np.float64], trust: NDArray[np.float64]) -> NDArray[np.float64]:
     """Weights ``(n,)`` of sum 1, lower where many points share a wall direction."""
     apart = np.abs(normal_rad[:, None] - normal_rad[None, :])
     apart = np.minimum(apart, math.pi - apart)
     density = np.nansum(np.exp(-0.5 * (apart / NORMAL_SPREAD_RAD) ** 2), axis=1)
     known = np.isfinite(normal_rad)
     typical = float(np.median(density[known])) if known.any() else 1.0
-    weight = np.where(known, density, typical).clip(1.0) ** -EVEN
+    weight = trust * np.where(known, density, typical).clip(1.0) ** -EVEN
     return np.asarray(weight / weight.sum(), dtype=np.float64)
 
 
-def points_of(xy_m: NDArray[np.float64]) -> Points:
+def points_of(xy_m: NDArray[np.float64], trust: NDArray[np.float64]) -> Points:
     """Thin and weigh points of walls."""
-    thinned = thin(xy_m)
+    thinned, mean_trust = thin(xy_m, trust)
     normal = normals(thinned)
-    return Points(thinned, even_weights(normal), normal)
+    return Points(thinned, mean_trust, even_weights(normal, mean_trust), normal)
 
 
 def field_of(grid: Grid) -> Field:
     """Make the field of a grid, with a border of unknown."""
     pad = math.ceil(PAD_M / grid.cell_m)
     state = np.pad(grid.state, pad)
-    wall = state == OCCUPIED
+    wall = np.pad(grid.log_odds, pad) > WALL_LOG_ODDS
     distance = np.full(state.shape, 1e3) if not wall.any() else np.asarray(distance_transform_edt(~wall)) * grid.cell_m
     return Field(distance, state == FREE, grid.cell_m, grid.x0_m - pad * grid.cell_m, grid.y0_m - pad * grid.cell_m)
