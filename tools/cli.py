@@ -22,6 +22,7 @@ COMMANDS: Final[dict[str, tuple[str, str]]] = {
     "replay": ("tools.replay", "map recorded logs as if they were live"),
     "run": ("tools.run", "the daemon: record, map, publish"),
     "keygen": ("tools.keygen", "make keys for a daemon that other machines reach"),
+    "bench": ("tools.bench_command", "the figures of the README, measured anew"),
     "demo": ("tools.demo", "an emulated dive, the real daemon on it, and the live page"),
 }
 """Name of each command, its module, and what it does in one line."""

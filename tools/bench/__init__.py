@@ -1,0 +1,1 @@
+"""Benches: the figures that the README states, each measured by one command."""

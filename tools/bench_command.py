@@ -1,0 +1,57 @@
+"""``lacuna bench``: the figures that the README states, measured anew."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import Final
+
+from config.errors import UsageError
+from tools.bench import tank, truth
+
+Row = dict[str, str | int | float]
+
+_BENCHES: Final = ("tank", "truth")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's options."""
+    parser.add_argument("benches", nargs="*", metavar="BENCH", help=f"which of {', '.join(_BENCHES)} (default: all)")
+    parser.add_argument("--data", type=Path, default=Path("../shared/data"), metavar="DIR", help="real recordings")
+    parser.add_argument("--seeds", type=int, default=2, metavar="N", help="emulated dives per site (default: 2)")
+    parser.add_argument("--json", action="store_true", help="print JSON lines")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Measure and print one line a case."""
+    if wrong := set(args.benches) - set(_BENCHES):
+        raise UsageError(f"there is no bench {', '.join(sorted(wrong))}; choose of {', '.join(_BENCHES)}")
+    for name in args.benches or _BENCHES:
+        if name == "tank" and not args.benches and not args.data.is_dir():
+            print(f"tank: left out, no recordings in {args.data} (name their folder with --data)")
+            continue
+        for row in _measure(name, args):
+            print(json.dumps({"bench": name} | row) if args.json else _line(name, row), flush=True)
+    return 0
+
+
+def _measure(name: str, args: argparse.Namespace) -> Iterator[Row]:
+    measures: dict[str, Callable[[argparse.Namespace], Iterator[Row]]] = {"tank": _tank, "truth": _truth}
+    return measures[name](args)
+
+
+def _tank(args: argparse.Namespace) -> Iterator[Row]:
+    for circles in (1, 14):
+        yield asdict(tank.measure(args.data, circles))
+
+
+def _truth(args: argparse.Namespace) -> Iterator[Row]:
+    for seed in range(1, args.seeds + 1):
+        yield asdict(truth.measure("keyhole", seed))
+
+
+def _line(name: str, row: Row) -> str:
+    return f"{name}: " + ", ".join(f"{key} {value}" for key, value in row.items())
