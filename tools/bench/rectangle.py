@@ -89,15 +89,18 @@ def _two_lines(values: NDArray[np.float64]) -> tuple[int, tuple[float, float]]:
 
 def _refine(points_m: NDArray[np.float64], rough: Rectangle) -> Rectangle:
     normal_rad, offset_m = rough.normal_rad.copy(), rough.offset_m.copy()
+    normals = np.stack([np.cos(normal_rad), np.sin(normal_rad)], axis=1)
+    apart_m = np.abs(points_m @ normals.T - offset_m)
     for wall in range(4):
-        normal = np.array([np.cos(normal_rad[wall]), np.sin(normal_rad[wall])])
-        near = points_m[np.abs(points_m @ normal - offset_m[wall]) < 2 * NEAR_M]
+        # Points near a corner belong to two walls and would bend both.
+        beside = (2, 3) if wall < 2 else (0, 1)
+        near = points_m[(apart_m[:, wall] < 2 * NEAR_M) & np.all(apart_m[:, beside] > 3 * NEAR_M, axis=1)]
         if len(near) < 4:
             continue
         centre = near.mean(axis=0)
         refined = np.linalg.svd(near - centre)[2][1]
-        refined = refined if refined @ normal > 0 else -refined
-        if refined @ normal > np.cos(np.radians(10)):
+        refined = refined if refined @ normals[wall] > 0 else -refined
+        if refined @ normals[wall] > np.cos(np.radians(10)):
             normal_rad[wall] = np.arctan2(refined[1], refined[0])
             offset_m[wall] = float(refined @ centre)
     return Rectangle(normal_rad, offset_m)
