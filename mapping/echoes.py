@@ -46,7 +46,7 @@ NEIGHBOUR_RAD = math.radians(30.0)
 """A silent beam is vouched for by the walls seen within this on either side."""
 BASE_SD_M = 0.02
 VAGUE_SD_M = 0.15
-"""Least standard deviation of a beam on the line that has no clear place: it helps to place a scan, and draws no wall."""
+"""Least standard deviation of a vague return: it helps to place a scan, and draws no wall."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -70,6 +70,7 @@ class Match:
 
     ``overlap`` is the share of the scan's weight that lies on known walls; ``weak_rad`` the direction (clockwise from
     north, in [0, pi)) in which the walls hold it least, and ``hold`` the information there, 0 to 0.5 of the whole.
+    ``height`` is the log-posterior, ``other`` the best pose elsewhere.
     """
 
     pose: Pose
@@ -78,6 +79,8 @@ class Match:
     overlap: float
     weak_rad: float
     hold: float
+    height: float
+    other: Pose
 
 
 class Likelihood:
@@ -126,11 +129,15 @@ def register(scan: View, reference: View, prior: Prior, particles: int, rng: np.
     best, height = search(like, prior, particles, rng, None)
     other, other_height = search(like, prior, particles, rng, best)
     if other_height > height:
-        best, height, other_height = other, other_height, height
+        best, height, other, other_height = other, other_height, best, height
     mean, covariance = local_moments(like, best)
     weak, hold = weakest_direction(scan, reference, mean)
-    pose = Pose(float(mean[0]), float(mean[1]), float(mean[2]) % (2.0 * math.pi))
-    return Match(pose, covariance, height - other_height, overlap(scan, reference, mean), weak, hold)
+    on_walls = overlap(scan, reference, mean)
+    return Match(_pose(mean), covariance, height - other_height, on_walls, weak, hold, height, _pose(other))
+
+
+def _pose(state: NDArray[np.float64]) -> Pose:
+    return Pose(float(state[0]), float(state[1]), float(state[2]) % (2.0 * math.pi))
 
 
 def search(

@@ -11,18 +11,24 @@ from config.schema import Map
 from mapping import grid as grids
 from mapping.beam import PolarEvidence, polar_evidence
 from mapping.compass import wrap
-from mapping.register import Match, Prior, register
+from mapping.register import ELSEWHERE_M, Match, Prior, register
 from mapping.values import Grid, Pose, Returns, Scan, Station, Status
 from mapping.view import View, field_of, points_of, to_map, wall_points
 
-ACCEPT_MARGIN = 6.0
+ACCEPT_MARGIN = 8.0
 """Log-posterior over the best pose elsewhere from which a scan counts as placed."""
-DOUBT_MARGIN = 2.0
+DOUBT_MARGIN = 3.0
 ACCEPT_OVERLAP = 0.35
 """Share of a scan's walls that must lie on known ones."""
 ACCEPT_SD_M = 0.3
 FEW_POINTS = 12
 """Scans with fewer wall points cannot be placed, and no map can begin with them."""
+LEVEL_M = 0.5
+"""Scans whose depths differ by more see other walls: wells taper."""
+TAPER = 0.5
+"""Largest widening of the walls per metre of depth ..."""
+TAPER_STEPS = 4
+"""... tried in so many steps to either side."""
 ORIGIN_SD_M = 0.01
 HINT_SD_M = 0.3
 """Least uncertainty of a pilot's hint."""
@@ -33,9 +39,9 @@ class Sight:
     """A scan made ready: what it says of the water around it, and how registration sees it."""
 
     scan: Scan
+    returns: Returns
     evidence: PolarEvidence
     view: View
-    alone: Grid
 
 
 def sight_of(scan: Scan, returns: Returns, config: Map) -> Sight:
@@ -43,7 +49,26 @@ def sight_of(scan: Scan, returns: Returns, config: Map) -> Sight:
     evidence = polar_evidence(scan, returns, math.radians(config.beam_deg), config.cell_m)
     alone = grids.render([(Pose(0.0, 0.0, 0.0), evidence)], config)
     points = points_of(*wall_points(scan.bearing_rad, returns))
-    return Sight(scan, evidence, View(points, field_of(alone)), alone)
+    return Sight(scan, returns, evidence, View(points, field_of(alone)))
+
+
+def shifted(returns: Returns, by_m: float) -> Returns:
+    """Move all walls away from the vehicle, as a taper between two depths does about a well's axis."""
+    return Returns(np.maximum(returns.range_m + by_m, 0.05), returns.sd_m, np.maximum(returns.free_m + by_m, 0.0))
+
+
+def best_of(matches: list[Match]) -> Match:
+    """Choose among matches of one scan under several assumptions; the margin is over all poses elsewhere."""
+    best = max(matches, key=lambda m: m.height)
+    poses = [(m.pose, m.height) for m in matches] + [(m.other, m.height - m.margin) for m in matches]
+    far = [h for p, h in poses if math.hypot(p.x_m - best.pose.x_m, p.y_m - best.pose.y_m) > ELSEWHERE_M]
+    return replace(best, margin=best.height - max(far, default=-math.inf))
+
+
+def _rise(a: Scan, b: Scan) -> float:
+    """Difference of two scans' depths; 0 where one was not told."""
+    rise = abs(a.depth_m - b.depth_m)
+    return 0.0 if math.isnan(rise) else rise
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,9 +141,19 @@ class Stations:
                 return self._nowhere(i, "the vehicle moved during the scan, and no map can begin with it")
             return self._origin(sight.scan)
         prior = self._prior(i, placed)
+        return self._judge(i, self._match(sight, placed, prior))
+
+    def _match(self, sight: Sight, placed: list[int], prior: Prior) -> Match:
+        """Register a scan in what the stations at its own level saw; without any, in what the others saw."""
         rng = np.random.default_rng([self._config.seed, sight.scan.index])
-        match = register(sight.view, self._reference(placed, prior, sight), prior, self._config.particles, rng)
-        return self._judge(i, match)
+        level = [k for k in placed if _rise(sight.scan, self._stations[k].scan) <= LEVEL_M]
+        reference = self._reference(level or placed, prior, sight)
+        if level:
+            return register(sight.view, reference, prior, self._config.particles, rng)
+        rise = min(_rise(sight.scan, self._stations[k].scan) for k in placed)
+        tapers = np.arange(-TAPER_STEPS, TAPER_STEPS + 1) * (TAPER * rise / TAPER_STEPS)
+        views = [sight_of(sight.scan, shifted(sight.returns, float(t)), self._config).view for t in tapers]
+        return best_of([register(v, reference, prior, self._config.particles, rng) for v in views])
 
     def _origin(self, scan: Scan) -> Station:
         heading_sd = math.radians(self._config.compass_sd_deg) / 4.0
