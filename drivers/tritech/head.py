@@ -45,7 +45,7 @@ class Head:
         self._due_ns = 0
         self._tries = 0
         self._heard_ns = 0
-        self._refused = False
+        self._refused = self._half_duplex = self._change_waits = False
         self._old = self._resent = self._losses = self._flagged = 0
 
     @property
@@ -69,12 +69,14 @@ class Head:
         return self._hear(t_ns, self._deframer.expire(t_ns)) + self._act(t_ns)
 
     def change(self, sonar: Sonar) -> None:
-        """Set the head differently, from the next `tick` or `push` on."""
+        """Set the head differently, from the next `tick` or `push` on; half duplex, after the ping under way."""
         self._sonar = sonar
         self._command = head_command(sonar)
         self._old = self._resent = 0
         self.settings_differ = False
-        if self._state in (State.SETTING, State.SCANNING):
+        if self._state is State.SCANNING and self._half_duplex and self._requests.owed:
+            self._change_waits = True
+        elif self._state in (State.SETTING, State.SCANNING):
             self._go(State.SETTING, None)
 
     def stop(self) -> None:
@@ -95,6 +97,7 @@ class Head:
     def _go(self, state: State, t_ns: int | None) -> None:
         """Enter a state; without a time, at the next one given."""
         self._state = state
+        self._change_waits = False
         self._tries = 0
         self._entered_ns = t_ns
         self._due_ns = 0 if t_ns is None else t_ns + STEPS[state].first_ns
@@ -130,6 +133,7 @@ class Head:
                 event = Event.VERSION
             case BBUserData():
                 self.user_block = message
+                self._half_duplex = message.half_duplex
                 self._requests.set_half_duplex(half_duplex=message.half_duplex)
                 event = Event.USER_BLOCK
             case HeadData():
@@ -138,8 +142,15 @@ class Head:
         if state is not None:
             self._go(State.REBOOTING if self._losses > _LOSSES else state, t_ns)
         elif isinstance(message, HeadData) and self._state is State.SCANNING and self._tries:
-            return self._request(t_ns) if self._requests.answered(t_ns) else b""
+            return self._answered(t_ns)
         return b""
+
+    def _answered(self, t_ns: int) -> bytes:
+        more = self._requests.answered(t_ns)
+        if self._change_waits:
+            self._go(State.SETTING, t_ns)
+            return b""
+        return self._request(t_ns) if more else b""
 
     def _judge(self, data: HeadData) -> Event | None:
         """Compare a ping with the settings sent; a few old ones may still be on their way after a change."""
@@ -193,7 +204,7 @@ class Head:
         if not self._requests.is_overdue(t_ns):
             return b""
         self._requests.missed()
-        if self._requests.unanswered >= patience:
+        if self._change_waits or self._requests.unanswered >= patience:
             self._go(State.SETTING, t_ns)
             return self._act(t_ns)
         return self._request(t_ns)

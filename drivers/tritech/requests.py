@@ -29,6 +29,11 @@ class RequestLoop:
         self._waits_from_ns = 0
         self._limit_ns = _MOTOR_WAKES_NS
 
+    @property
+    def owed(self) -> int:
+        """Pings that are still to come for the requests sent."""
+        return self._owed
+
     def set_half_duplex(self, *, half_duplex: bool) -> None:
         """Take over what the head's settings block says: on such a line only one of the two may speak."""
         if half_duplex:

@@ -174,6 +174,21 @@ def test_settings_change_and_old_pings_are_let_through() -> None:
     assert not line.head.settings_differ
 
 
+@pytest.mark.parametrize("answers", [True, False])
+def test_half_duplex_settings_wait_for_the_ping_under_way(answers: bool) -> None:
+    line = Line(ScriptedHead(half_duplex=True, pings_per_request=1)).run(10)
+    while not line.scripted.queue:
+        line.run(0.01)
+    if not answers:
+        line.scripted.queue = []
+    longer = SONAR.model_copy(update={"range_m": 20.0})
+    line.head.change(longer)
+    line.run(0.01)
+    assert line.scripted.count(commands.HeadCommand) == 1
+    line.run(3)
+    assert (line.head.state, line.scripted.parameters) == ("scanning", head_command(longer).parameters)
+
+
 def test_a_head_with_a_will_of_its_own_is_taken_as_it_is() -> None:
     line = Line(ScriptedHead(own_step=16)).run(60)
     assert (line.head.state, line.head.settings_differ) == ("scanning", True)
