@@ -6,6 +6,7 @@ import select
 import sys
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 from subprocess import PIPE, Popen
@@ -67,13 +68,12 @@ class Emulation:
         self._wait_s = max(_PIECE_NS / speed / SECOND_NS, _SHORTEST_WAIT_S)
         self._tell = tell or (lambda _: None)
         self._lock = FolderLock(folder)
-        ports: list[PtyPort] = []
-        try:
-            ports += [PtyPort(folder / name) for name in ("sonar", "feed")]
-        except BaseException:
-            self._lock.release()
-            raise
-        self.sonar, self.feed = ports
+        with ExitStack() as undo:
+            undo.callback(self._lock.release)
+            self.sonar = PtyPort(folder / "sonar")
+            undo.callback(self.sonar.close)
+            self.feed = PtyPort(folder / "feed")
+            undo.pop_all()
 
     def truth(self) -> dict[str, Json]:
         """Return where everything truly is and was (see ``truth_of``)."""
