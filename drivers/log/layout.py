@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Callable
 from typing import Final
 
 from mcap.records import Schema
 
 from config.errors import LogError
-from drivers.records import Chunk, ClockPair, Event, Json, Record
+from drivers.records import Chunk, ClockPair, Direction, Event, Json, Record
 
 RECORD_LIMIT: Final = 1 << 20
 """Largest payload of one message in bytes; a port never delivers as much at once."""
@@ -25,8 +26,12 @@ RAW_ENCODING: Final = "application/octet-stream"
 JSON_ENCODING: Final = "json"
 
 _RAW: Final = re.compile(r"/raw/([a-z0-9_-]+)/(rx|tx)")
+_DIRECTIONS: Final[dict[str, Direction]] = {"rx": "rx", "tx": "tx"}
 _INTEGER: Final = {"type": "integer"}
 _U64: Final = 1 << 64
+
+Maker = Callable[[int, int, bytes], Record]
+"""Makes a record from UTC, monotonic time and payload."""
 
 
 def _schema(number: int, name: str, properties: dict[str, Json]) -> Schema:
@@ -81,17 +86,22 @@ def _payload(record: Record) -> bytes:
         raise LogError(f"cannot record event {record.kind!r}: {error}; give finite numbers, text and lists") from error
 
 
-def record_of(topic: str, utc_ns: int, t_ns: int, data: bytes) -> Record | None:
-    """Return the record of a message, or None for a topic that is not of the log's own (an export's, say).
+def maker_of(topic: str) -> Maker | None:
+    """Return what turns the messages of ``topic`` into records; None for a topic not of the log's own (an export's).
 
-    Raises ValueError, KeyError or TypeError on a payload that does not fit its topic.
+    A maker raises ValueError, KeyError or TypeError on a payload that does not fit its topic.
     """
     if (raw := _RAW.fullmatch(topic)) is not None:
-        return Chunk(t_ns, utc_ns, raw[1], "rx" if raw[2] == "rx" else "tx", data)
-    if topic == CLOCK_TOPIC:
-        return ClockPair(t_ns, utc_ns)
-    if topic != EVENT_TOPIC:
-        return None
+        port, direction = raw[1], _DIRECTIONS[raw[2]]
+        return lambda utc_ns, t_ns, data: Chunk(t_ns, utc_ns, port, direction, data)
+    return {CLOCK_TOPIC: _clock_pair, EVENT_TOPIC: _event}.get(topic)
+
+
+def _clock_pair(utc_ns: int, t_ns: int, _data: bytes) -> Record:
+    return ClockPair(t_ns, utc_ns)
+
+
+def _event(utc_ns: int, t_ns: int, data: bytes) -> Record:
     body = json.loads(data)
     kind, fields = body["kind"], body["fields"]
     if not isinstance(kind, str) or not isinstance(fields, dict):

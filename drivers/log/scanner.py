@@ -21,7 +21,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Metadata
 
 from drivers.log.header import is_intact
-from drivers.log.layout import RECORD_LIMIT, record_of
+from drivers.log.layout import RECORD_LIMIT, Maker, maker_of
 from drivers.log.segment import MAGIC, packed
 from drivers.records import Record
 
@@ -220,22 +220,21 @@ def _entries(data: bytes) -> list[Entry] | None:
 
 
 def _messages(plain: bytes) -> Iterator[Entry]:
-    topics: dict[int, str] = {}
+    channels: dict[int, tuple[str, Maker | None]] = {}
     position = 0
     while position < len(plain):
         opcode, length = _RECORD_HEAD.unpack_from(plain, position)
         start, position = position, position + _RECORD_HEAD.size + length
         if position > len(plain):
             raise ValueError("a record reaches beyond its chunk")
-        if opcode == Opcode.CHANNEL:
-            channel = Channel.read(_stream(plain[start:position]))
-            topics[channel.id] = channel.topic
-        elif opcode == Opcode.MESSAGE:
+        if opcode == Opcode.MESSAGE:
             _, _, number, sequence, utc_ns, t_ns = _MESSAGE.unpack_from(plain, start)
-            topic = topics[number]
-            record = record_of(topic, utc_ns, t_ns, plain[start + _MESSAGE.size : position])
-            if record is not None:
-                yield Entry(topic, sequence, record)
+            topic, make = channels[number]
+            if make is not None:
+                yield Entry(topic, sequence, make(utc_ns, t_ns, plain[start + _MESSAGE.size : position]))
+        elif opcode == Opcode.CHANNEL:
+            channel = Channel.read(_stream(plain[start:position]))
+            channels[channel.id] = channel.topic, maker_of(channel.topic)
 
 
 def _stream(data: bytes) -> ReadDataStream:

@@ -1,9 +1,8 @@
-"""Writing logs: a session as a row of segments, or records into one file."""
+"""Writing a session's log as a row of segments."""
 
 from __future__ import annotations
 
 import errno
-from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Final
 
@@ -21,6 +20,9 @@ FLUSH_NS: Final = 200_000_000
 
 SYNC_NS: Final = 900_000_000
 """Age at which what was flushed is forced to the disk: below the 1 s promised."""
+
+RETRY_NS: Final = 1_000_000_000
+"""Pause after a refusal before ``tick`` tries the disk again."""
 
 _MIB: Final = 1 << 20
 _MINUTE_NS: Final = 60_000_000_000
@@ -50,6 +52,7 @@ class LogWriter:
         self._begun_t_ns: int | None = None
         self._oldest_t_ns: int | None = None
         self._unsynced_t_ns: int | None = None
+        self._retry_t_ns: int | None = None
         self._closed = False
         self._next = 1
         self._previous: str | None = None
@@ -107,11 +110,21 @@ class LogWriter:
         self._unsynced_t_ns = None
 
     def tick(self, t_ns: int) -> None:
-        """Flush and sync what has waited long enough at ``t_ns``, on the clock of the records' ``t_ns``."""
-        if self._oldest_t_ns is not None and t_ns - self._oldest_t_ns >= FLUSH_NS:
-            self.flush()
-        if self._unsynced_t_ns is not None and t_ns - self._unsynced_t_ns >= SYNC_NS:
-            self.sync()
+        """Flush and sync what has waited long enough at ``t_ns``, on the clock of the records' ``t_ns``.
+
+        Raises LogError where the disk refuses, and then leaves it in peace for a second.
+        """
+        if self._retry_t_ns is not None and t_ns < self._retry_t_ns:
+            return
+        self._retry_t_ns = None
+        try:
+            if self._oldest_t_ns is not None and t_ns - self._oldest_t_ns >= FLUSH_NS:
+                self.flush()
+            if self._unsynced_t_ns is not None and t_ns - self._unsynced_t_ns >= SYNC_NS:
+                self.sync()
+        except LogError:
+            self._retry_t_ns = t_ns + RETRY_NS
+            raise
 
     def close(self) -> None:
         """Write what is left and give the last segment its name; a second call does nothing.
@@ -210,35 +223,6 @@ class LogWriter:
 
     def _refused(self, error: OSError) -> LogError:
         return refused(error, self._folder)
-
-
-def write_log(path: Path, metadata: Mapping[str, str], records: Iterable[Record]) -> int:
-    """Write ``records`` into the one file ``path``, which appears when it is whole; return their number.
-
-    Raises LogError, also where ``path`` exists.  Whatever stops the writing, the unfinished file is removed.
-    """
-    table, buffer, count = ChannelTable(), ChunkBuffer(), 0
-    try:
-        segment = Segment(path, metadata)
-    except OSError as error:
-        raise refused(error, path) from error
-    try:
-        for record in records:
-            channel, message = table.message(record)
-            if not buffer.has_room(message):
-                segment.write_chunk(buffer)
-                buffer.clear()
-            buffer.add(channel, message)
-            count += 1
-        segment.write_chunk(buffer)
-        segment.close()
-    except OSError as error:
-        segment.discard()
-        raise refused(error, path) from error
-    except BaseException:
-        segment.discard()
-        raise
-    return count
 
 
 def refused(error: OSError, where: Path) -> LogError:
