@@ -11,6 +11,7 @@ from config.schema import Map
 from mapping import grid as grids
 from mapping.beam import PolarEvidence, polar_evidence
 from mapping.compass import wrap
+from mapping.refine import Member, refine
 from mapping.register import ELSEWHERE_M, Match, Prior, register
 from mapping.values import Grid, Pose, Returns, Scan, Station, Status
 from mapping.view import View, field_of, points_of, to_map, wall_points
@@ -23,12 +24,16 @@ ACCEPT_OVERLAP = 0.35
 ACCEPT_SD_M = 0.3
 FEW_POINTS = 12
 """Scans with fewer wall points cannot be placed, and no map can begin with them."""
+ADJUST, ADJUST_WITH = 6, 12
+"""So many stations nearest to a new one are adjusted with it, and so many held ones hold them."""
+MIN_HEADING_SD_RAD = math.radians(0.5)
 LEVEL_M = 0.5
 """Scans whose depths differ by more see other walls: wells taper."""
 TAPER = 0.5
 """Largest widening of the walls per metre of depth ..."""
 TAPER_STEPS = 4
 """... tried in so many steps to either side."""
+LEAST_PARTICLES = 200
 ORIGIN_SD_M = 0.01
 HINT_SD_M = 0.3
 """Least uncertainty of a pilot's hint."""
@@ -61,8 +66,12 @@ def best_of(matches: list[Match]) -> Match:
     """Choose among matches of one scan under several assumptions; the margin is over all poses elsewhere."""
     best = max(matches, key=lambda m: m.height)
     poses = [(m.pose, m.height) for m in matches] + [(m.other, m.height - m.margin) for m in matches]
-    far = [h for p, h in poses if math.hypot(p.x_m - best.pose.x_m, p.y_m - best.pose.y_m) > ELSEWHERE_M]
+    far = [height for pose, height in poses if _apart(pose, best.pose) > ELSEWHERE_M]
     return replace(best, margin=best.height - max(far, default=-math.inf))
+
+
+def _apart(a: Pose, b: Pose) -> float:
+    return math.hypot(a.x_m - b.x_m, a.y_m - b.y_m)
 
 
 def _rise(a: Scan, b: Scan) -> float:
@@ -105,6 +114,7 @@ class Stations:
         self._stations.append(self._place(len(self._stations)))
         if self._stations[-1].status == "placed":
             self._try_again(len(self._stations) - 1)
+            self._adjust(len(self._stations) - 1)
         return self._stations[-1]
 
     def drop(self, index: int) -> bool:
@@ -123,6 +133,25 @@ class Stations:
         both = zip(self._stations, self._sights, strict=False)
         return [(station.pose, sight.evidence) for station, sight in both if station.status == "placed"]
 
+    def _adjust(self, newest: int) -> None:
+        """Adjust the newest station and its neighbours together; those farther away and the origin stay."""
+        centre = self._stations[newest].pose
+        placed = self._placed()
+        near = sorted(placed, key=lambda k: (_apart(self._stations[k].pose, centre), k))[:ADJUST_WITH]
+        held = {placed[0], *near[ADJUST:]}
+        members = [self._member(k, k in held) for k in near]
+        for k, pose in zip(near, refine(members), strict=True):
+            self._stations[k] = replace(self._stations[k], pose=pose)
+
+    def _member(self, k: int, held: bool) -> Member:
+        station = self._stations[k]
+        level = next(j for j in self._placed() if _rise(station.scan, self._stations[j].scan) <= LEVEL_M)
+        sd = max(math.sqrt(float(station.covariance[2, 2])), MIN_HEADING_SD_RAD)
+        return Member(station.pose, self._sights[k].view.points, sd, level, held)
+
+    def _placed(self) -> list[int]:
+        return [k for k, s in enumerate(self._stations) if s.status == "placed"]
+
     def _try_again(self, newest: int) -> None:
         waiting = [i for i, s in enumerate(self._stations[:newest]) if s.status in ("doubtful", "unplaced")]
         for i in waiting:
@@ -133,7 +162,7 @@ class Stations:
     def _place(self, i: int) -> Station:
         sight = self._sights[i]
         points = len(sight.view.points.xy_m)
-        placed = [k for k, s in enumerate(self._stations) if s.status == "placed" and k != i]
+        placed = [k for k in self._placed() if k != i]
         if points < FEW_POINTS:
             return self._nowhere(i, f"only {points} wall points in the scan: is there a wall within the range?")
         if not placed:
@@ -153,7 +182,8 @@ class Stations:
         rise = min(_rise(sight.scan, self._stations[k].scan) for k in placed)
         tapers = np.arange(-TAPER_STEPS, TAPER_STEPS + 1) * (TAPER * rise / TAPER_STEPS)
         views = [sight_of(sight.scan, shifted(sight.returns, float(t)), self._config).view for t in tapers]
-        return best_of([register(v, reference, prior, self._config.particles, rng) for v in views])
+        particles = max(LEAST_PARTICLES, self._config.particles // 3)
+        return best_of([register(v, reference, prior, particles, rng) for v in views])
 
     def _origin(self, scan: Scan) -> Station:
         heading_sd = math.radians(self._config.compass_sd_deg) / 4.0

@@ -81,6 +81,13 @@ def to_map(pose: Pose, xy_m: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.stack([x, y], axis=1)
 
 
+def from_map(pose: Pose, xy_m: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Bring points ``(n, 2)`` from the map's axes into the vehicle's."""
+    c, s = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
+    dx, dy = xy_m[:, 0] - pose.x_m, xy_m[:, 1] - pose.y_m
+    return np.stack([c * dx - s * dy, s * dx + c * dy], axis=1)
+
+
 def thin(xy_m: NDArray[np.float64], trust: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Keep one point, the mean, per square of ``THIN_M`` with its mean trust; in order of the squares."""
     if not len(xy_m):
