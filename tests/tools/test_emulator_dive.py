@@ -28,7 +28,7 @@ SHORT = VehicleOptions(rest_pings=30)
 
 
 def short_dive(seed: int = 1, options: DiveOptions | None = None) -> tuple[Dive, list[Piece]]:
-    dive = Dive(SITES["keyhole"](), seed, options or DiveOptions(stations=2, vehicle=SHORT))
+    dive = Dive(SITES["keyhole"](), seed, options or DiveOptions(stations=1, vehicle=SHORT))
     return dive, list(record(dive))
 
 
@@ -129,7 +129,7 @@ def test_a_slow_scan_makes_rests_longer() -> None:
 
 def test_mounting_of_the_head_is_undone_by_the_configuration() -> None:
     plain = pings_of(short_dive()[1])[:20]
-    options = DiveOptions(stations=2, vehicle=SHORT, mount_rad=radians(90.0), upside_down=True)
+    options = DiveOptions(stations=1, vehicle=SHORT, mount_rad=radians(90.0), upside_down=True)
     turned = pings_of(short_dive(1, options)[1], Sonar(mount_deg=90.0, inverted=True))[:20]
     assert degrees(turned[0].bearing_rad) == pytest.approx(90.0)
     assert degrees(turned[1].bearing_rad) == pytest.approx(88.2)
