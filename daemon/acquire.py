@@ -136,15 +136,13 @@ class Acquisition:
         self._recorder.event(kind, fields | ({"message": why} if why else {}))
 
     def _obey(self, command: dict[str, Any]) -> None:
-        """Do what the operator asked for; it is in the log before it is answered."""
+        """Do what the operator asked for; it is in the log, safe from a crash, before it is answered."""
         do, fields = command["do"], command["fields"]
-        error: str | None = None
         if do == "sonar":
             self._set_sonar(fields)
-        elif do == "save":
-            error = self._recorder.sync()
-        else:
+        elif do != "save":
             self._recorder.event(do, fields)
+        error = self._recorder.sync() if do == "save" else self._recorder.flush()
         answer: dict[str, Json] = {"token": command["token"], "error": error}
         self._link.report(ANSWER, answer | {"fields": self._recorder.health() if do == "save" else {}})
 
@@ -202,7 +200,7 @@ def _versions() -> dict[str, str]:
 def main() -> int:
     """Acquire the session that standard input names."""
     job = take_job()
-    link = Link(job.link, "acquire", wait_s=0.0)
+    link = Link(job.link, "acquire", wait_s=0.0, heeds_term=True)
     try:
         acquisition = Acquisition(job, link)
         link.report(READY, {})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import subprocess
 import sys
 import time
@@ -66,10 +67,9 @@ class Child:
         return self._died_s is not None and time.monotonic() >= self._died_s
 
     def ask_to_stop(self) -> None:
-        """Ask it to end in order."""
+        """Ask it to end in order: its standard input ends."""
         self._died_s = None
-        if self._process is not None:
-            self._process.terminate()
+        self._close_stdin()
 
     def kill(self) -> None:
         """End it at once."""
@@ -79,9 +79,10 @@ class Child:
             self._forget()
 
     def _forget(self) -> None:
-        process, self._process = self._process, None
-        if process is not None and process.stdin is not None:
-            try:
-                process.stdin.close()
-            except BrokenPipeError:
-                return
+        self._close_stdin()
+        self._process = None
+
+    def _close_stdin(self) -> None:
+        if self._process is not None and self._process.stdin is not None:
+            with contextlib.suppress(BrokenPipeError):
+                self._process.stdin.close()

@@ -112,7 +112,7 @@ class MapProcess:
 def main() -> int:
     """Follow the session that standard input names."""
     job = take_job()
-    link = Link(job.link, "map", wait_s=2.0)
+    link = Link(job.link, "map", wait_s=2.0, heeds_term=False)
     try:
         link.report(READY, {})
         with Follower(job.folder, job.session) as follower:

@@ -34,9 +34,13 @@ def take_job() -> Job:
 
 
 class Link:
-    """The child called ``name`` at its end of the line; ``wait_s`` is how long a full line may hold it up."""
+    """The child called ``name`` at its end of the line.
 
-    def __init__(self, address: str, name: str, wait_s: float) -> None:
+    ``wait_s`` is how long a full line may hold it up.  With ``heeds_term`` SIGTERM ends it too; without, only the
+    supervisor does, because a service manager signals all processes at once and the map must outlive the log.
+    """
+
+    def __init__(self, address: str, name: str, wait_s: float, heeds_term: bool) -> None:
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context(io_threads=1)
         self._socket = self._context.socket(zmq.DEALER)
         self._socket.setsockopt(zmq.IDENTITY, name.encode())
@@ -47,7 +51,7 @@ class Link:
         self._poller.register(self._socket, zmq.POLLIN)
         self._poller.register(_STDIN, zmq.POLLIN)
         self._stop = False
-        signal.signal(signal.SIGTERM, self._on_signal)
+        signal.signal(signal.SIGTERM, self._on_signal if heeds_term else signal.SIG_IGN)
         signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     @property

@@ -64,6 +64,11 @@ class Recorder:
             self._look_at_disk()
         self._guard(lambda: self._writer.tick(t_ns))
 
+    def flush(self) -> str | None:
+        """Hand everything to the operating system; return why that failed, or None."""
+        self._guard(self._writer.flush)
+        return self._error
+
     def sync(self) -> str | None:
         """Bring everything to the disk; return why that failed, or None."""
         self._guard(self._writer.sync)

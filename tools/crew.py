@@ -50,16 +50,8 @@ class Crew:
             raise LacunaError("the emulated vehicle did not start; see its message above")
         path = self._scratch / "demo.toml"
         path.write_text(self._configuration(), encoding="utf-8")
-        words = [
-            "run",
-            "--config",
-            str(path),
-            "--json",
-            "--clock-rate",
-            str(self._speed),
-            "--map-wait",
-            str(_MAP_WAIT_S),
-        ]
+        words = ["run", "--json", "--config", str(path)]
+        words += ["--clock-rate", str(self._speed), "--map-wait", str(_MAP_WAIT_S)]
         # A session of its own keeps Ctrl-C from it: the demo stops its processes in order.
         self._daemon = Popen(_lacuna(words), stdout=PIPE, text=True, start_new_session=True)  # noqa: S603  (our own)
 
