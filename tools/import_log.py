@@ -20,6 +20,7 @@ from tools.importers.convert import Clock, records
 from tools.importers.lines import Survey
 from tools.importers.ports import DRIVERS, Ports, assign
 from tools.importers.table import FORMATS, format_of
+from tools.progress import counted
 
 _BAUD: Final = 115200
 
@@ -50,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
     base = load_config(args.config) if args.config is not None else Config()
     name = format_of(args.file, args.format)
     form, losses = FORMATS[name], Losses()
-    survey = Survey(form.read(args.file, args.baud, losses), args.baud)
+    survey = Survey(counted(form.read(args.file, args.baud, losses), "pieces heard"), args.baud)
     if survey.first is None:
         raise DataError(f"{args.file} holds nothing that is {form.title}; name another --format")
     feed_baud = args.baud if name == "serial" else Feed().baud
@@ -58,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
     clock = Clock(survey.first.t_ns, -survey.earliest_t_ns, start_utc_ns)
     note = _note(args.file, form, ports, losses, dated=start_utc_ns is not None or survey.first.utc_ns is not None)
     header = LogHeader(ports.config, {"lacuna": version("lacuna"), "import": name}, args.output.stem)
-    pieces = form.read(args.file, args.baud, Losses())
+    pieces = counted(form.read(args.file, args.baud, Losses()), "pieces written")
     count = write_log(args.output, header.metadata(), records(pieces, ports.names, clock, note))
     _report(args, name, count, survey, ports, losses)
     return 0

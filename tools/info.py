@@ -16,6 +16,7 @@ from drivers.log import Damage, LogHeader, log_files, read_log, read_metadata
 from drivers.log.header import check_format, header_of
 from drivers.log.names import session_of
 from tools.log_facts import SessionFacts, Values, port_body
+from tools.progress import counted
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +79,7 @@ def facts(session: Session) -> dict[str, Any]:
     damage = Damage()
     config = session.header.config if session.header else Config()
     gathered = SessionFacts(config)
-    for record in read_log(session.files, damage):
+    for record in counted(read_log(session.files, damage), "records read"):
         gathered.take(record)
     gathered.finish()
     return {

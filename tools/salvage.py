@@ -13,6 +13,7 @@ from config.load import load_config
 from drivers.log import Damage, LogHeader, log_files, read_log, read_metadata, write_log
 from drivers.log.header import check_format, signed
 from drivers.records import Event, Json, Record
+from tools.progress import counted
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,7 +31,7 @@ def run(args: argparse.Namespace) -> int:
         raise LogError(f"{args.output} exists; choose another name with -o or move it away")
     metadata = _metadata(files, args.config, args.output)
     damage = Damage()
-    count = write_log(args.output, metadata, salvaged(files, damage))
+    count = write_log(args.output, metadata, counted(salvaged(files, damage), "records saved"))
     if args.json:
         print(json.dumps({"log": str(args.output), "records": count, "lost": asdict(damage)}))
         return 0

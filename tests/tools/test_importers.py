@@ -204,6 +204,9 @@ def test_v4log_that_breaks_off_gives_what_is_before(shared_data: Path, tmp_path:
     whole = (shared_data / "sonar/sector-90deg-2005.V4LOG").read_bytes()
     (tmp_path / "cut.V4LOG").write_bytes(whole[:200_000])
     assert len(pings(imported(tmp_path / "cut.V4LOG", tmp_path / "x.mcap"))) == (200_000 - 61_435) // 688
+    packed = gzip.compress(whole)
+    (tmp_path / "cut.gz").write_bytes(packed[: len(packed) * 3 // 4])
+    assert 100 < len(pings(imported(tmp_path / "cut.gz", tmp_path / "y.mcap"))) < 468
 
 
 def test_every_bad_input_is_one_line_with_its_exit_code(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

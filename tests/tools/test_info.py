@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 import math
 import random
+import tempfile
 from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from config.schema import Config
 from drivers.log import LogHeader, LogWriter, write_log
@@ -135,6 +140,23 @@ def test_every_bad_input_is_one_line_with_its_exit_code(tmp_path: Path, capsys: 
             assert captured.err.startswith("lacuna: ")
             assert captured.err.count("\n") == 1
     assert not (tmp_path / "out.mcap").exists()
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.tuples(st.integers(0, 2**20), st.binary(max_size=200)), min_size=1, max_size=6), st.booleans())
+def test_any_wounds_end_in_facts_or_in_one_line(wounds: list[tuple[int, bytes]], is_json: bool) -> None:
+    with tempfile.TemporaryDirectory() as name:
+        path = dive(Path(name)) / "dive-0001.mcap"
+        data = path.read_bytes()
+        for place, patch in wounds:
+            at = place % (len(data) + 1)
+            data = data[:at] + patch + data[at + (place >> 12) :]
+        path.write_bytes(data)
+        out, err = io.StringIO(), io.StringIO()
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+            code = cli.main(["info", str(path), *(["--json"] if is_json else [])])
+    assert (code, err.getvalue().count("\n")) in ((0, 0), (65, 1))
+    assert bool(out.getvalue()) == (code == 0)
 
 
 @pytest.mark.parametrize(

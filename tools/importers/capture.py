@@ -6,8 +6,9 @@ import gzip
 import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from io import BufferedIOBase
 from pathlib import Path
-from typing import IO, Final, cast
+from typing import Final
 
 from config.errors import InputError
 from drivers.records import Direction
@@ -56,17 +57,17 @@ class Format:
     read: Reader
 
 
-def opened(path: Path) -> IO[bytes]:
+def opened(path: Path) -> BufferedIOBase:
     """Open ``path`` for reading, unpacking gzip; raises InputError."""
     try:
         with path.open("rb") as file:
             is_packed = file.read(2) == _GZIP
-        return cast("IO[bytes]", gzip.open(path, "rb")) if is_packed else path.open("rb")
+        return gzip.GzipFile(path, "rb") if is_packed else path.open("rb")
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror}; check the name") from error
 
 
-def pieces(path: Path, losses: Losses, read: Callable[[IO[bytes]], bytes]) -> Iterator[bytes]:
+def pieces(path: Path, losses: Losses, read: Callable[[BufferedIOBase], bytes]) -> Iterator[bytes]:
     """Yield what ``read`` takes from the opened ``path`` until it is empty; a damaged gzip ends where it breaks."""
     with opened(path) as file:
         while True:

@@ -15,7 +15,7 @@ from typing import Final
 from config.errors import DataError
 from drivers.records import Direction
 from drivers.tritech.ids import HOST, MessageId
-from tools.importers.capture import Captured, Format, Losses, opened
+from tools.importers.capture import Captured, Format, Losses, pieces
 
 LINE: Final = "sonar"
 MAGIC: Final = b"SeaNetV4 Log File V1"
@@ -27,12 +27,12 @@ _FRAME_REST: Final = 5
 _EPOCH_DAYS: Final = 25569
 _DAY_NS: Final = 86_400_000_000_000
 _LATEST_DAYS: Final = 100_000
+_PIECE_BYTES: Final = 1 << 20
 
 
 def read(path: Path, _baud: int, losses: Losses) -> Iterator[Captured]:
     """Yield each message as the serial frame that it was; raises DataError where the file's header is damaged."""
-    with opened(path) as file:
-        data = file.read()
+    data = b"".join(pieces(path, losses, lambda file: file.read1(_PIECE_BYTES)))
     if len(data) < _HEADER_AT + _HEADER.size:
         raise DataError(f"{path} is a V4LOG that ends within its header; nothing was recorded in it")
     _, _, start, _, trailer, index, _, _ = _HEADER.unpack_from(data, _HEADER_AT)
