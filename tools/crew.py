@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import json
 import signal
 import socket
@@ -13,10 +14,10 @@ from subprocess import PIPE, Popen, TimeoutExpired
 from typing import Any, Final, Self
 
 from config.errors import LacunaError
-from tools.emulator.serve import spawn
 
 _MAP_WAIT_S: Final = 120
 _STOP_S: Final = 5.0
+_PR_SET_PDEATHSIG: Final = 1
 
 
 class Crew:
@@ -45,22 +46,25 @@ class Crew:
 
     def start(self, seed: int, stations: int | None, truth: Path | None) -> None:
         """Start the vehicle, and when its ports are there the daemon; raise LacunaError where one does not start."""
-        self._emulation = spawn(self._scratch / "ports", self._site, seed, self._speed, stations, truth)
+        words = ["emulate", "--json", "--folder", str(self._scratch / "ports"), "--site", self._site]
+        words += ["--seed", str(seed), "--speed", str(self._speed)]
+        words += [] if stations is None else ["--stations", str(stations)]
+        words += [] if truth is None else ["--truth", str(truth)]
+        self._emulation = _started(words)
         if next(self._emulation_events(), {}).get("event") != "ready":
             raise LacunaError("the emulated vehicle did not start; see its message above")
         path = self._scratch / "demo.toml"
         path.write_text(self._configuration(), encoding="utf-8")
         words = ["run", "--json", "--config", str(path)]
         words += ["--clock-rate", str(self._speed), "--map-wait", str(_MAP_WAIT_S)]
-        # A session of its own keeps Ctrl-C from it: the demo stops its processes in order.
-        self._daemon = Popen(_lacuna(words), stdout=PIPE, text=True, start_new_session=True)  # noqa: S603  (our own)
+        self._daemon = _started(words)
 
     def open_dashboard(self) -> str:
         """Start the dashboard, which opens the browser; return its address."""
         snapshots, requests, page = self._ports
         words = ["dashboard", "--connect", f"tcp://127.0.0.1:{snapshots}", "--requests", f"tcp://127.0.0.1:{requests}"]
         words += ["--port", str(page), "--open"]
-        self._dashboard = Popen(_lacuna(words), stdout=PIPE, text=True, start_new_session=True)  # noqa: S603  (our own)
+        self._dashboard = _started(words)
         return f"http://127.0.0.1:{page}/"
 
     def events(self) -> Iterator[dict[str, Any]]:
@@ -114,8 +118,16 @@ class Crew:
         )
 
 
-def _lacuna(words: list[str]) -> list[str]:
-    return [sys.executable, "-P", "-m", "tools.cli", *words]
+def _started(words: list[str]) -> Popen[str]:
+    """Start our own program with ``words``; it is stopped when the demo dies, however that dies."""
+    command = [sys.executable, "-P", "-m", "tools.cli", *words]
+    # A session of its own keeps Ctrl-C from it: the demo stops its processes in order.
+    return Popen(command, stdout=PIPE, text=True, start_new_session=True, preexec_fn=_follow_parent)  # noqa: S603
+
+
+def _follow_parent() -> None:
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
 def _free_ports(count: int) -> list[int]:

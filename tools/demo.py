@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import signal
 import sys
 import tempfile
 from contextlib import ExitStack
@@ -44,6 +45,8 @@ def run(args: argparse.Namespace) -> int:
     if args.seed < 0 or (args.stations is not None and args.stations < 1):
         raise UsageError("--seed must not be negative, --stations 1 or more")
     with ExitStack() as stack:
+        # Whoever ends the demo with SIGTERM means what Ctrl-C means: the other processes end with it.
+        stack.callback(signal.signal, signal.SIGTERM, signal.signal(signal.SIGTERM, signal.default_int_handler))
         scratch = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="lacuna-demo-")))
         folder = args.out.resolve() if args.out else scratch / "logs"
         make_folder(folder)
