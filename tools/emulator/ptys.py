@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import os
 import pty
+import sys
 import termios
 import tty
 from pathlib import Path
@@ -14,6 +15,7 @@ from config.errors import InputError, PortError
 
 _DEAF_NS: Final = 2_000_000_000
 _MOST_WAITING: Final = 1 << 20
+_HELD: Final = 2048
 
 
 class PtyPort:
@@ -68,12 +70,21 @@ class PtyPort:
             self._close_pair()
 
     def _hand_over(self) -> int:
+        # Beyond what the terminal itself holds, the kernel keeps bytes where a flush does not find them.
+        room = _HELD - self._unread()
+        if room <= 0:
+            return 0
         try:
-            count = os.write(self._device, self._waiting)
+            count = os.write(self._device, self._waiting[:room])
         except BlockingIOError:
             return 0
         del self._waiting[:count]
         return count
+
+    def _unread(self) -> int:
+        """Bytes that wait at the host's side for somebody to read them."""
+        answer = fcntl.ioctl(self._host, termios.FIONREAD, b"\0\0\0\0")
+        return int.from_bytes(answer, sys.byteorder)
 
     def _close_pair(self) -> None:
         os.close(self._device)

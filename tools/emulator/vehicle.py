@@ -27,7 +27,7 @@ class VehicleOptions:
     turn_rad_s: float = 0.5
     rest_s: float = 14.0
     rest_pings: int | None = None
-    circles: float = 1.25
+    circles: float = 1.4
     longest_rest_s: float = 90.0
     drift_m: float = 0.003
     wobble_rad: float = 0.004
