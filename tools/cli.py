@@ -15,6 +15,7 @@ COMMANDS: Final[dict[str, tuple[str, str]]] = {
     "info": ("tools.info", "what is in a log"),
     "salvage": ("tools.salvage", "what can be read of a broken log, into a new one"),
     "emulate": ("tools.emulate", "an emulated vehicle on two pseudo-terminals, or recorded to a file"),
+    "view": ("tools.view", "the mesh in an Open3D window"),
     "dashboard": ("tools.dashboard_command", "the live page in a browser"),
     "fill": ("tools.fill_map", "fill the holes of a ROS map_server map"),
     "ports": ("tools.ports", "the serial ports of this machine"),

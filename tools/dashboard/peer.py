@@ -69,7 +69,8 @@ class Peer:
 
     def subscriber(self, context: zmq.asyncio.Context) -> zmq.asyncio.Socket:
         """Return a socket that hears every topic and connects again by itself."""
-        socket = self._prepared(context.socket(zmq.SUB))
+        socket = context.socket(zmq.SUB)
+        prepare(socket, self.curve)
         socket.setsockopt(zmq.RCVHWM, _WAITING_MESSAGES)
         for topic in wire.TOPICS:
             socket.subscribe(topic)
@@ -78,7 +79,8 @@ class Peer:
 
     async def ask(self, request: bytes) -> dict[str, Any]:
         """Return the daemon's answer to a JSON ``request``, or an ``error`` in its form where none came in time."""
-        with self.context() as context, self._prepared(context.socket(zmq.DEALER)) as socket:
+        with self.context() as context, context.socket(zmq.DEALER) as socket:
+            prepare(socket, self.curve)
             socket.connect(self.requests)
             await socket.send(request)
             if not await socket.poll(int(ANSWER_S * 1000)):
@@ -96,17 +98,18 @@ class Peer:
             )
         return answer
 
-    def _prepared(self, socket: zmq.asyncio.Socket) -> zmq.asyncio.Socket:
-        socket.setsockopt(zmq.LINGER, 0)
-        socket.setsockopt(zmq.MAXMSGSIZE, _LARGEST_BYTES)
-        socket.setsockopt(zmq.HEARTBEAT_IVL, 1000)
-        socket.setsockopt(zmq.HEARTBEAT_TIMEOUT, 3000)
-        socket.setsockopt(zmq.RECONNECT_IVL, 200)
-        socket.setsockopt(zmq.RECONNECT_IVL_MAX, 2000)
-        if self.curve is not None:
-            socket.curve_publickey, socket.curve_secretkey = self.curve.public, self.curve.secret
-            socket.curve_serverkey = self.curve.server
-        return socket
+
+def prepare(socket: zmq.Socket[Any], curve: Curve | None) -> None:
+    """Make ``socket`` a careful one: bounded messages, dead peers found, no waiting at the end, keys where given."""
+    socket.setsockopt(zmq.LINGER, 0)
+    socket.setsockopt(zmq.MAXMSGSIZE, _LARGEST_BYTES)
+    socket.setsockopt(zmq.HEARTBEAT_IVL, 1000)
+    socket.setsockopt(zmq.HEARTBEAT_TIMEOUT, 3000)
+    socket.setsockopt(zmq.RECONNECT_IVL, 200)
+    socket.setsockopt(zmq.RECONNECT_IVL_MAX, 2000)
+    if curve is not None:
+        socket.curve_publickey, socket.curve_secretkey = curve.public, curve.secret
+        socket.curve_serverkey = curve.server
 
 
 def failure(code: str, message: str, hint: str) -> dict[str, Any]:
