@@ -5,10 +5,9 @@ from __future__ import annotations
 import contextlib
 from typing import Final
 
-from drivers.port import Port
-
 from config.errors import PortError
 from drivers.counters import Counters
+from drivers.port import Port
 from drivers.records import Json
 
 _FIRST_WAIT_NS: Final = 200_000_000
@@ -92,14 +91,14 @@ class Line:
         passed_s = max((t_ns - before_ns) / 1e9, 1e-3)
         return {
             "state": "open" if self.is_open else "lost",
+            "rx_bytes_s": round((self._rx_bytes - rx_bytes) / passed_s, 1),
+            "tx_bytes_s": round((self._tx_bytes - tx_bytes) / passed_s, 1),
+            "last_s": None if self._newest_ns is None else round((t_ns - self._newest_ns) / 1e9, 2),
+            "lost": self._losses,
+            "skipped": counters.skipped_bytes,
             "url": self.url,
             "rx_bytes": self._rx_bytes,
             "tx_bytes": self._tx_bytes,
-            "rx_bytes_s": round((self._rx_bytes - rx_bytes) / passed_s, 1),
-            "tx_bytes_s": round((self._tx_bytes - tx_bytes) / passed_s, 1),
-            "losses": self._losses,
-            "silent_s": None if self._newest_ns is None else round((t_ns - self._newest_ns) / 1e9, 2),
             "frames": dict(counters.frames),
             "bad": dict(counters.bad),
-            "skipped_bytes": counters.skipped_bytes,
         }

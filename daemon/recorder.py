@@ -79,14 +79,14 @@ class Recorder:
         self._writer.close()
 
     def health(self) -> dict[str, Json]:
-        """Return ``log`` and ``disk`` for health."""
+        """Return what health says of log and disk."""
         log: dict[str, Json] = {
             "file": self._writer.path.name,
             "raw_bytes": self._bytes,
             "lost_records": self._writer.lost_records,
             "error": self._error,
         }
-        return {"log": log, "disk": {"free_mib": round(self._free_mib, 1), "is_low": self._is_low}}
+        return {"log": log, "disk_free_mib": round(self._free_mib, 1), "disk_is_low": self._is_low}
 
     def _write(self, record: Record) -> None:
         self._guard(lambda: self._writer.write(record))

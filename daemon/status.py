@@ -37,7 +37,7 @@ class Status:
 
     def has_lost(self, port: str) -> bool:
         """Whether ``port`` was ever lost."""
-        return bool(self._parts.get("ports", {}).get(port, {}).get("losses"))
+        return bool(self._ports().get(port, {}).get("lost"))
 
     def is_due(self) -> bool:
         """Whether it is time to tell; once a second."""
@@ -62,7 +62,13 @@ class Status:
             "processes": {"supervisor": {"pid": os.getpid(), "restarts": 0}, **processes},
             "newest": dict(numbers),
         }
+        if children["acquire"][0] is None:
+            # What it told last is no longer so.
+            self._parts["ports"] = {name: {**port, "state": "down"} for name, port in self._ports().items()}
         return encode(snapshots.health(*stamp, self._parts), 0, self._session)
+
+    def _ports(self) -> dict[str, Any]:
+        return dict(self._parts.get("ports", {}))
 
     def fields(self) -> dict[str, Json]:
         """Return the newest health for the answer to a request."""
