@@ -71,8 +71,8 @@ class Rig:
         assert json.loads(process.stdout.readline())["event"] == "ready"
         return process
 
-    def run(self, config: Path, rate: float = 1.0) -> subprocess.Popen[str]:
-        words = ["run", "--json", "--config", str(config), "--clock-rate", str(rate), "--map-wait", "60"]
+    def run(self, config: Path, rate: float = 1.0, map_wait_s: float = PATIENCE_S) -> subprocess.Popen[str]:
+        words = ["run", "--json", "--config", str(config), "--clock-rate", str(rate), "--map-wait", str(map_wait_s)]
         command = [sys.executable, "-m", "tools.cli", *words]
         self.daemon = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         self._processes.append(self.daemon)

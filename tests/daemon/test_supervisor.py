@@ -156,6 +156,30 @@ def test_the_children_end_with_the_supervisor(rig: Rig, line: tuple[int, str]) -
     assert not list(rig.logs.glob("*.part"))
 
 
+def test_a_map_that_hangs_does_not_hold_up_the_end(rig: Rig, line: tuple[int, str]) -> None:
+    rig.run(configuration(rig.folder, line[1], rig.ports), map_wait_s=0.5)
+    rig.wait(lambda: rig.pid("map") is not None)
+    pid = rig.pid("map")
+    assert pid is not None
+    os.kill(pid, signal.SIGSTOP)
+    outcome = rig.stop()
+    assert not outcome["map"].get("is_final")
+    assert events(rig.logs)[-1] == "stopped"
+
+
+def test_a_signal_to_all_processes_ends_them_in_order(rig: Rig, line: tuple[int, str]) -> None:
+    rig.run(configuration(rig.folder, line[1], rig.ports))
+    rig.wait(lambda: "map" in rig.health())
+    for name in ("map", "acquire"):
+        pid = rig.pid(name)
+        assert pid is not None
+        os.kill(pid, signal.SIGTERM)
+    outcome = rig.stop()
+    assert outcome["map"]["is_final"] is True
+    assert outcome["map"]["records"] == len(list(read_log(rig.logs)))
+    assert not list(rig.logs.glob("*.part"))
+
+
 def fails(words: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str]:
     code = main(words)
     error = capsys.readouterr().err
