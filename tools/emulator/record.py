@@ -16,6 +16,9 @@ from tools.emulator.dive import Dive
 TICK_NS: Final = 10_000_000
 """How often the host reads its ports: 10 ms, as a kernel hands bytes over."""
 
+TAIL_NS: Final = 3_000_000_000
+"""How long a recording goes on after the dive is done: nobody pulls the plug at once."""
+
 _GIVE_UP_NS: Final = 4 * 3600 * 1_000_000_000
 
 
@@ -35,8 +38,8 @@ def record(dive: Dive, sonar: Sonar | None = None) -> Iterator[Piece]:
     The host is the one that drives real heads; ``sonar`` is its configuration.
     """
     host = Head(sonar or Sonar())
-    t_ns = 0
-    while not dive.done and t_ns < _GIVE_UP_NS:
+    t_ns, end_ns = 0, _GIVE_UP_NS
+    while t_ns < end_ns:
         t_ns += TICK_NS
         from_sonar, from_feed = dive.tick(t_ns)
         if from_feed:
@@ -46,7 +49,8 @@ def record(dive: Dive, sonar: Sonar | None = None) -> Iterator[Piece]:
         if asked := host.push(t_ns, from_sonar) if from_sonar else host.tick(t_ns):
             yield Piece(t_ns, "sonar", "tx", asked)
             dive.push(t_ns, asked)
-        dive.advance(t_ns)
+        if dive.advance(t_ns) and dive.done:
+            end_ns = t_ns + TAIL_NS
 
 
 def write_jsonl(pieces: Iterable[Piece], path: Path) -> int:
