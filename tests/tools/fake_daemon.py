@@ -30,7 +30,7 @@ PILLAR_M: Final = (0.8, 0.6, 0.35)
 GAPS_M: Final = ((4.1, 0.0, 0.45, 0.9), (-2.0, 3.1, 0.4, 0.35))
 """Where the wall was not seen: x, y, half width, certainty of the fill."""
 X0_M, Y0_M, ROWS, COLS = -4.0, -3.0, 160, 220
-RANGE_M, BINS, STEP_DEG = 8.0, 400, 1.8
+RANGE_M, BINS, STEP_DEG, PINGS_HZ = 8.0, 400, 1.8, 40.0
 PLACES_M: Final = ((0.0, 0.0), (-1.6, 1.2), (1.6, 1.9), (4.6, 0.55))
 
 
@@ -190,16 +190,15 @@ def health(t_ns: int, sonar_state: str = "open") -> Snapshot:
 class FakeDaemon:
     """Serves the site on ``port`` and ``port + 1`` until closed; ``heard`` holds the requests that came."""
 
-    def __init__(self, port: int, session: str = "session-one", pings_hz: float = 40.0) -> None:
+    def __init__(self, port: int, session: str = "session-one", keys: str | None = None) -> None:
         self.port = port
         self.heard: list[Request] = []
         self.silent = threading.Event()
         self.sonar_state = "open"
         self._ended = threading.Event()
-        self._pings_hz = pings_hz
         self._session = session
         self._more: deque[Snapshot] = deque()
-        self._publish = Publish(port=port, request_port=port + 1)
+        self._publish = Publish(port=port, request_port=port + 1, keys=keys)
         self._ready = threading.Event()
         self._thread = threading.Thread(target=self._serve, name="fake daemon")
         self._thread.start()
@@ -222,7 +221,7 @@ class FakeDaemon:
             self._ready.set()
             rng, number, beaten = np.random.default_rng(1), 0, 0.0
             while not self._ended.is_set():
-                broker.turn(1 / self._pings_hz)
+                broker.turn(1 / PINGS_HZ)
                 if self.silent.is_set():
                     continue
                 self._say(ping(number, rng))

@@ -297,12 +297,12 @@ def test_a_new_session_clears_the_page_and_a_lost_server_is_said(chromium: Brows
     try:
         with dashboard(port) as served:
             page.goto(served.url)
-            expect(page.locator("#session")).to_have_text("session session-")
+            expect(page.locator("#session")).to_have_text("session session-one")
             first.say(Snapshot("event", 1, time.time_ns(), {"kind": "mark", "fields": {}}))
             expect(page.locator("#events li")).to_have_count(1)
             first.close()
             first = FakeDaemon(port, "again-two")
-            expect(page.locator("#session")).to_have_text("session again-tw", timeout=15_000)
+            expect(page.locator("#session")).to_have_text("session again-two", timeout=15_000)
             expect(page.locator("#events li")).to_have_count(0)
             expect(page.locator("#link-word")).to_have_text("live")
         expect(page.locator("#banner")).to_contain_text("lost", timeout=10_000)

@@ -11,14 +11,16 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+import numpy as np
 import pytest
 from fake_daemon import FakeDaemon
 from live_page import Dashboard, dashboard, free_port, lacuna
 from websockets.exceptions import InvalidStatus
-from websockets.sync.client import connect
+from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
 import tools.dashboard.server
+from daemon.snapshots import Snapshot
 
 
 @pytest.fixture(scope="module")
@@ -139,6 +141,54 @@ def test_without_a_daemon_a_request_is_answered_all_the_same() -> None:
         assert (status, answer["error"]["code"]) == (200, "no-answer")
         assert "lacuna run" in answer["error"]["hint"]
         assert first_frames(page.url, {"bridge"})["bridge"]["silent_s"] is None
+
+
+def test_a_page_that_does_not_read_slows_nobody_and_ends_on_the_newest() -> None:
+    daemon = FakeDaemon(free_port())
+    try:
+        with dashboard(daemon.port) as page, listening(page.url) as slow, listening(page.url) as quick:
+            noise = np.random.default_rng(1).random((200_000, 3), np.float32)
+            for number in range(1, 31):
+                daemon.say(Snapshot("mesh", number, number, {"number": number}, {"vertices": noise}))
+            assert meshes(quick, 30)[-1] == 30
+            late = meshes(slow, 30)
+            assert late[-1] == 30
+            assert len(late) < 20, "old meshes were kept for a page that did not read"
+    finally:
+        daemon.close()
+
+
+def listening(url: str) -> ClientConnection:
+    return connect(
+        url.replace("http", "ws") + "ws", origin=Origin(url.rstrip("/")), max_size=None, max_queue=1, close_timeout=0.1
+    )
+
+
+def meshes(page: ClientConnection, last: int) -> list[int]:
+    """Numbers of the meshes that come, up to ``last``."""
+    got = [0]
+    while got[-1] != last:
+        frame = page.recv(timeout=30)
+        assert isinstance(frame, bytes)
+        header = json.loads(frame[4 : 4 + int.from_bytes(frame[:4], "little")])
+        if header["topic"] == "mesh" and "number" in header:
+            got.append(header["number"])
+    return got
+
+
+def test_keys_open_a_daemon_that_has_them_and_nothing_else_does(tmp_path: Path) -> None:
+    keys = tmp_path / "keys"
+    assert lacuna("keygen", str(keys)).returncode == 0
+    daemon = FakeDaemon(free_port(), keys=str(keys))
+    try:
+        with dashboard(daemon.port, "--keys", str(keys)) as page:
+            assert first_frames(page.url, {"bridge", "station", "ping"})["ping"]["session"] == "session-one"
+            assert ask(page.url, {"id": 1, "do": "mark"}) == (200, {"id": 1, "ok": True})
+        with dashboard(daemon.port) as page:
+            assert ask(page.url, {"id": 1, "do": "mark"})[1]["error"]["code"] == "no-answer"
+            assert first_frames(page.url, {"bridge"})["bridge"]["silent_s"] is None
+    finally:
+        daemon.close()
 
 
 def test_a_token_lets_in_once_and_leaves_the_address() -> None:

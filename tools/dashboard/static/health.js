@@ -30,7 +30,7 @@ export function duration(seconds) {
 
 function number(value) {
   if (typeof value !== "number" || Number.isInteger(value)) return String(value);
-  return Math.abs(value) >= 100 ? value.toFixed(0) : String(+value.toPrecision(3));
+  return Math.abs(value) >= 10 ? value.toFixed(0) : String(+value.toPrecision(3));
 }
 
 /** `rx_bytes_s: 3120` as "3120 rx bytes/s": units stand at the end of the names. */
@@ -52,23 +52,26 @@ export class Health {
     this.find("ports").replaceChildren(element("li", "empty", "Nothing heard of the ports yet."));
     this.find("facts").replaceChildren();
     this.find("events").replaceChildren();
-    for (const name of ["lag", "disk"]) this.find(name).textContent = "";
+    for (const name of ["lag", "disk", "head-state"]) this.find(name).textContent = "";
   }
 
   push(header) {
     const ports = Object.entries(header.ports ?? {});
     this.find("ports").replaceChildren(...ports.map(([name, port]) => portItem(name, port)));
     this.headline(header);
-    const facts = flatten(header).filter(([name]) => !name.startsWith("ports ") && !HEADER.has(name));
+    const facts = flatten(rest(header));
     this.find("facts").replaceChildren(...facts.flatMap(([name, value]) => [element("dt", "", name), element("dd", "", number(value))]));
   }
 
   headline(header) {
+    const head = header.sonar?.state;
+    this.find("head-state").textContent = head ? String(head).replaceAll("_", " ") : "";
     const lag = header.map?.lag_s;
     const free = header.disk_free_mib;
     this.find("lag").textContent = Number.isFinite(lag) ? `map ${lag < LAG_SLOW_S ? "" : "late, "}${duration(lag)} behind` : "";
     if (!Number.isFinite(free)) return;
     const size = free >= 1024 ? `${(free / 1024).toFixed(1)} GiB` : `${free.toFixed(0)} MiB`;
+    this.find("disk").dataset.level = free < DISK_LOW_MIB ? "low" : "";
     this.find("disk").textContent = `${free < DISK_LOW_MIB ? "disk low, " : ""}${size} free`;
   }
 
@@ -82,14 +85,22 @@ export class Health {
   }
 }
 
-const HEADER = new Set(["v", "seq", "session", "t_ns", "utc_ns", "topic", "arrays"]);
+const SHOWN = new Set(["v", "seq", "session", "t_ns", "utc_ns", "topic", "arrays", "site", "newest"]);
+
+function rest(header) {
+  return Object.fromEntries(Object.entries(header).filter(([name]) => !SHOWN.has(name)));
+}
+
+/** What stands beside a port at all times: rates and losses. The rest is in its title and under Health. */
+const isBrief = (key) => (key.endsWith("_s") && key !== "last_s") || ["lost", "skipped", "error"].includes(key);
 
 function portItem(name, port) {
   const { lamp, word } = judge(port);
   const item = element("li");
   item.dataset.lamp = lamp;
   item.dataset.port = name;
-  const details = Object.entries(port).filter(([key, value]) => key !== "state" && value !== null && typeof value !== "object");
+  const details = Object.entries(port).filter(([key, value]) => isBrief(key) && value !== null);
+  item.title = Object.entries(port).map(([key, value]) => phrase(key, value)).join("\n");
   item.append(element("i", "lamp"), element("span", "name", name), element("span", "word", word));
   item.append(element("span", "detail", details.map(([key, value]) => phrase(key, value)).join("  ·  ")));
   return item;

@@ -34,7 +34,7 @@ function receive(message) {
   const { session } = message.header;
   if (page.session !== null && session !== page.session) clear();
   page.session = session;
-  find("session").textContent = session ? `session ${String(session).slice(0, 8)}` : "";
+  find("session").textContent = session ? `session ${session}` : "";
   TOPICS[message.topic]?.(message);
 }
 
@@ -135,7 +135,7 @@ function select(name) {
     find(`${each}-box`).hidden = !chosen;
     find(`${each}-tools`).hidden = !chosen;
   }
-  for (const each of ["free", "unknown", "station", "goal"]) find(`legend-${each}`).hidden = name === "mesh";
+  for (const each of ["free", "unknown", "station", "end", "goal"]) find(`legend-${each}`).hidden = name === "mesh";
   find("legend-floor").hidden = name === "plan";
   document.querySelector(".map").toggleAttribute("data-mesh", name === "mesh");
   mesh.show(name === "mesh");

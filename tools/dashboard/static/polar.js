@@ -153,7 +153,7 @@ export class Polar {
   }
 
   drawRings(g) {
-    const step = RING_STEPS.find((each) => this.rangeM / each <= 5) ?? 100;
+    const step = RING_STEPS.find((each) => this.rangeM / each <= 6) ?? 100;
     g.strokeStyle = "rgb(200 215 225 / 26%)";
     g.fillStyle = "rgb(225 235 242 / 88%)";
     g.lineWidth = this.scale;
