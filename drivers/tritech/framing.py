@@ -27,6 +27,9 @@ from drivers.tritech.sizes import LARGEST, STAGES, flaw
 GRACE_NS: Final = 1_000_000_000
 """Pause within a frame that a slow link may make (a serial server over a radio, a busy computer)."""
 
+_STALE: Final = 512
+"""Times of dropped bytes that are kept at most."""
+
 # An '@' with four hex digits, or the beginning of one at the end of the bytes held.
 _START: Final = re.compile(rb"@(?:[0-9A-Fa-f]{4}|[0-9A-Fa-f]{0,3}\Z)")
 
@@ -81,7 +84,10 @@ class Deframer:
 
     def push(self, t_ns: int, data: bytes) -> list[Frame]:
         """Take bytes that arrived at ``t_ns`` and return the frames that they complete."""
-        if not data:
+        if not self._buffer and b"@" not in data:
+            # Noise on an idle line, the most frequent garbage: nothing of it needs to be held or dated.
+            self.skipped += len(data)
+            self._base += len(data)
             return []
         if not self._times or self._times[-1] != t_ns:
             self._offsets.append(self._base + len(self._buffer))
@@ -115,7 +121,8 @@ class Deframer:
 
     def _scan(self) -> list[Frame]:
         frames: list[Frame] = []
-        self._need, self._deadline_ns = 0, None
+        # Fewer bytes than tell both lengths are left alone; they have no deadline either.
+        self._need, self._deadline_ns = STAGES[0], None
         at = self._seek(0, 0)
         while (held := len(self._buffer) - at) >= STAGES[0]:
             size = int(self._buffer[at + 1 : at + 5], 16) + 6
@@ -127,7 +134,7 @@ class Deframer:
                 frames.append(Frame(self._time(at), bytes(self._buffer[at : at + size])))
                 at = self._seek(at + size, at + size)
             else:
-                self._need = min([size, *(stage for stage in STAGES if stage > held)])
+                self._need = min(next((stage for stage in STAGES if stage > held), size), size)
                 self._deadline_ns = self._time(at) + self._limit_ns(size)
                 break
         self._drop(at)
@@ -141,17 +148,25 @@ class Deframer:
         return at
 
     def _flaw(self, at: int, size: int, held: int) -> str | None:
+        start = bytes(self._buffer[at : at + min(held, size, STAGES[-1])])
+        is_quick = self._times[-1] - self._times[0] <= self._limit_ns(size)
+        reason = flaw(start, size) if is_quick else self._slow_flaw(at, start, size, held)
+        if reason is not None:
+            return reason
+        return "end" if held >= size and self._buffer[at + size - 1] != 0x0A else None
+
+    def _slow_flaw(self, at: int, start: bytes, size: int, held: int) -> str | None:
         """Judge stage by stage, as if the bytes came one by one, so that the reason is the same however they came."""
         for stage in (*STAGES, size):
             have = min(stage, size, held)
             if have > STAGES[0] and self._time(at + have - 1) - self._time(at) > self._limit_ns(size):
                 return "late"
-            reason = flaw(self._buffer[at : at + min(have, STAGES[-1])], size)
+            reason = flaw(start[:have], size)
             if reason is not None:
                 return reason
             if have < stage:
                 break
-        return "end" if held >= size and self._buffer[at + size - 1] != 0x0A else None
+        return None
 
     def _limit_ns(self, size: int) -> int:
         return GRACE_NS + 2 * size * self._byte_ns
@@ -163,7 +178,8 @@ class Deframer:
         del self._buffer[:count]
         self._base += count
         gone = bisect_right(self._offsets, self._base) - 1 if self._buffer else len(self._offsets)
-        if gone > 0:
+        # Seldom, because the rest of a list moves with each removal at its front.
+        if gone >= _STALE or not self._buffer:
             del self._offsets[:gone], self._times[:gone]
 
 
