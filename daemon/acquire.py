@@ -10,10 +10,11 @@ import contextlib
 import os
 import platform
 import sys
+from dataclasses import asdict
 from importlib.metadata import version
 from typing import Any, Final
 
-from config.errors import LacunaError, PortError
+from config.errors import DataError, LacunaError, PortError
 from config.schema import Sonar
 from daemon import snapshots
 from daemon.beams import Beams
@@ -41,6 +42,8 @@ class Acquisition:
         self._head = Head(self._sonar)
         self._is_stopped = False
         self._beams = Beams(job.config)
+        for name, surface_mbar in job.surfaces_mbar.items():
+            self._beams.tare(name, surface_mbar)
         self._lines = _lines(job)
         self._told_ns = 0
         try:
@@ -117,6 +120,7 @@ class Acquisition:
         if line.descriptor is not None:
             self._link.forget(line.descriptor)
         line.drop(self._clock.now()[0])
+        self._beams.interrupt(line.name)
         self._tell_port("port_lost", line, str(error))
 
     def _came_back(self, line: Line) -> None:
@@ -138,13 +142,26 @@ class Acquisition:
     def _obey(self, command: dict[str, Any]) -> None:
         """Do what the operator asked for; it is in the log, safe from a crash, before it is answered."""
         do, fields = command["do"], command["fields"]
+        error: str | None = None
         if do == "sonar":
             self._set_sonar(fields)
+        elif do == "tare":
+            error = self._tare(fields)
         elif do != "save":
             self._recorder.event(do, fields)
-        error = self._recorder.sync() if do == "save" else self._recorder.flush()
+        error = error or (self._recorder.sync() if do == "save" else self._recorder.flush())
         answer: dict[str, Json] = {"token": command["token"], "error": error}
         self._link.report(ANSWER, answer | {"fields": self._recorder.health() if do == "save" else {}})
+
+    def _tare(self, fields: dict[str, Any]) -> str | None:
+        """Record the pressure at the surface, then use it; return why that is not possible, or None."""
+        try:
+            tare = self._beams.tare_of(self._clock.now()[0], fields.get("port"), fields.get("surface_mbar"))
+        except DataError as error:
+            return str(error)
+        self._recorder.event("tare", asdict(tare))
+        self._beams.tare(tare.port, tare.surface_mbar)
+        return None
 
     def _set_sonar(self, fields: dict[str, Any]) -> None:
         changed = {key: value for key, value in fields.items() if key not in ("start", "stop")}
@@ -166,7 +183,11 @@ class Acquisition:
         if t_ns - self._told_ns < _HEALTH_NS * self._clock.rate:
             return
         self._told_ns = t_ns
-        ports = {name: line.health(t_ns, self._beams.counters(name)) for name, line in self._lines.items()}
+        beams = self._beams
+        ports = {
+            name: line.health(t_ns, beams.counters(name)) | beams.health(name, t_ns)
+            for name, line in self._lines.items()
+        }
         sonar: dict[str, Json] = {
             "state": self._head.state,
             "pings": self._beams.pings,

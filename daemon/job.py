@@ -6,7 +6,7 @@ The input stays open for as long as the supervisor lives; its end tells the chil
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from config.schema import Config
@@ -15,13 +15,17 @@ from daemon.clock import Clock
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """``link`` is the supervisor's socket; ``is_first`` is false for a child that takes over from one that died."""
+    """``link`` is the supervisor's socket; ``is_first`` is false for a child that takes over from one that died.
+
+    ``surfaces_mbar``: pressures at the surface, by feed, that the operator has taken in this session.
+    """
 
     link: str
     session: str
     config: Config
     clock: Clock
     is_first: bool
+    surfaces_mbar: dict[str, float] = field(default_factory=dict)
 
     @property
     def folder(self) -> Path:
@@ -37,6 +41,7 @@ class Job:
             "rate": self.clock.rate,
             "origin_ns": list(self.clock.origin_ns),
             "is_first": self.is_first,
+            "surfaces_mbar": self.surfaces_mbar,
         }
         return json.dumps(body).encode() + b"\n"
 
@@ -45,4 +50,5 @@ def read_job(line: bytes) -> Job:
     """Return the job in ``line``."""
     body = json.loads(line)
     clock = Clock(body["rate"], tuple(body["origin_ns"]))
-    return Job(body["link"], body["session"], Config.model_validate(body["config"]), clock, body["is_first"])
+    config = Config.model_validate(body["config"])
+    return Job(body["link"], body["session"], config, clock, body["is_first"], body["surfaces_mbar"])

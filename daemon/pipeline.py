@@ -14,8 +14,8 @@ from daemon.gridstream import GridStream
 from daemon.mapshots import Stamp
 from daemon.snapshots import Snapshot
 from daemon.state import MapState
-from drivers.decoders import decoders_for
-from drivers.readings import Reading
+from drivers.decoders import decoders_for, heed
+from drivers.readings import Reading, is_usable
 from drivers.records import Chunk, Event, Json, Record
 from fill.filler import Filler
 from fill.guide import guide
@@ -68,7 +68,7 @@ class Pipeline:
 
     def _take(self, readings: list[Reading]) -> list[Snapshot]:
         told: list[Snapshot] = []
-        for reading in readings:
+        for reading in filter(is_usable, readings):
             self._extent.see(reading)
             for scan in self._scans.push(reading):
                 told += self._step(scan)
@@ -88,7 +88,7 @@ class Pipeline:
         if event.kind == "drop" and is_number and self._mapper.drop(int(_number(station))):
             self._redraw()
             return self._tell()
-        return []
+        return self._take(heed(self._decoders, event))
 
     def _redraw(self) -> tuple[Filled, Mesh]:
         filled = self._filler.update(self._mapper.grid)

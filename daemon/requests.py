@@ -87,6 +87,13 @@ class HintFields(Fields):
         return {"dx_m": round(dx_m, 6), "dy_m": round(dy_m, 6), "sd_m": round(sd_m, 6)}
 
 
+class TareFields(Fields):
+    """The vehicle is at the surface: its pressure there, as told or as its sensor tells now.  ``port``: the feed."""
+
+    port: str | None = Field(None, max_length=32)
+    surface_mbar: float | None = Field(None, ge=500, le=1200)
+
+
 class DropFields(Fields):
     """A station to be left out of the map, by the index of its scan."""
 
@@ -101,6 +108,7 @@ FORMS: Final[dict[str, type[Fields]]] = {
     "hint": HintFields,
     "drop": DropFields,
     "note": TextFields,
+    "tare": TareFields,
     "save": Nothing,
 }
 """What may be asked, and what each carries."""

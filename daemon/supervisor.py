@@ -68,6 +68,7 @@ class Supervisor:
         self._signals = 0
         self._is_ready = False
         self._fatal: LacunaError | None = None
+        self._surfaces_mbar: dict[str, float] = {}
 
     def run(self) -> Outcome:
         """Run until SIGINT or SIGTERM.
@@ -126,7 +127,7 @@ class Supervisor:
             child.start(self._job(is_first=False))
 
     def _job(self, is_first: bool) -> Job:
-        return Job(self._address, self.session, self._config, self._clock, is_first)
+        return Job(self._address, self.session, self._config, self._clock, is_first, dict(self._surfaces_mbar))
 
     def _hear(self) -> None:
         """Take what the children said."""
@@ -153,6 +154,8 @@ class Supervisor:
 
     def _say_event(self, header: dict[str, Any]) -> None:
         kind, fields = header["kind"], header["fields"]
+        if kind == "tare":
+            self._surfaces_mbar[fields["port"]] = fields["surface_mbar"]
         if kind in ("port_lost", "disk") or (kind == "port_opened" and self._status.has_lost(fields["port"])):
             self._say(" ".join([kind, *(f"{key}={value}" for key, value in fields.items())]))
 

@@ -4,6 +4,7 @@ import json
 import socket
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -133,16 +134,43 @@ def test_a_late_joiner_has_the_state_at_once(broker: Broker, net: Net, publish: 
 def test_a_reader_that_stood_still_gets_the_newest(broker: Broker, net: Net, publish: Publish) -> None:
     reader = net.socket(zmq.SUB)
     reader.setsockopt(zmq.RCVHWM, 2)
-    reader.subscribe("mesh")
+    reader.subscribe("")
     reader.connect(f"{publish.bind}:{publish.port}")
     broker.publish(frames("mesh", 0))
     assert until(broker, lambda: bool(read(reader)))
-    for value in range(1, 400):
+    for value in range(1, 300):
         broker.publish(frames("mesh", value, 200_000))
         broker.turn(0)
+    for topic in ("grid/key", "grid/delta", "station"):
+        broker.publish(frames(topic, 7))
+    got: dict[str, object] = {}
+
+    def newest() -> bool:
+        got.update({message.snapshot.topic: message.snapshot.fields["value"] for message in read(reader)})
+        return got == {"mesh": 299, "grid/key": 7, "grid/delta": 7, "station": 7}
+
+    assert until(broker, newest, wait_s=30.0)
+
+
+def test_a_reader_that_stands_still_holds_nobody_up(broker: Broker, net: Net, publish: Publish) -> None:
+    slow = net.socket(zmq.SUB)
+    slow.setsockopt(zmq.RCVHWM, 2)
+    quick = subscribe(net, publish, "")
+    slow.subscribe("")
+    slow.connect(f"{publish.bind}:{publish.port}")
+    broker.publish(frames("mesh", 0))
     got: list[Message] = []
-    assert until(broker, lambda: any(m.snapshot.fields["value"] == 399 for m in read(reader, got)[-1:]))
-    assert len(got) < 399
+    assert until(broker, lambda: bool(read(quick, got) and slow.poll(0)))
+    for value in range(1, 150):
+        broker.publish(frames("mesh", value, 200_000))
+        assert until(broker, partial(has_come, quick, value))
+    late = subscribe(net, publish, "mesh")
+    assert until(broker, lambda: bool(late.poll(0)))
+    assert read(late)[-1].snapshot.fields["value"] == 149
+
+
+def has_come(reader: Socket, value: int) -> bool:
+    return value in {message.snapshot.fields["value"] for message in read(reader)}
 
 
 def ask(net: Net, publish: Publish, broker: Broker, kind: int, words: bytes) -> dict[str, object]:

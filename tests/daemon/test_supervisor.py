@@ -77,6 +77,7 @@ def test_a_dive_with_kills_gives_the_map_of_its_log(rig: Rig) -> None:
     rig.wait(lambda: rig.newest("station") is not None)
     rig.kill("map")
     rig.wait(lambda: rig.health()["map"].get("is_level", False) and rig.health()["map"]["stations"] >= 1)
+    topics_of_a_late_joiner(rig)
     saved = rig.ask(id=3, do="save")
     assert saved["ok"] is True
     assert saved["log"]["error"] is None
@@ -92,27 +93,28 @@ def test_a_dive_with_kills_gives_the_map_of_its_log(rig: Rig) -> None:
     assert [path.name for path in rig.logs.glob("*.part")] == [f"{outcome['session']}-0001.mcap.part"]
 
 
-def test_a_late_joiner_is_told_everything(rig: Rig) -> None:
-    rig.emulate(speed=10.0, stations=1)
-    ports = rig.folder / "ports"
-    rig.run(configuration(rig.folder, ports / "sonar", rig.ports, ports / "feed"), rate=10.0)
-    rig.wait(lambda: rig.newest("mesh") is not None)
-    late = Rig(rig.folder)
-    late.ports = rig.ports
-    reader = late.subscriber()
+def topics_of_a_late_joiner(rig: Rig) -> set[str]:
+    reader = rig.subscriber()
     topics: set[str] = set()
     try:
         while not {"station", "grid/key", "fill", "mesh", "guide"} <= topics:
-            assert reader.poll(10_000)
+            assert reader.poll(30_000), topics
             topics.add(reader.recv_multipart()[0].decode())
     finally:
         reader.close(linger=0)
-        late.close()
+    return topics
+
+
+def test_the_sonar_is_set_and_stopped_on_request(rig: Rig) -> None:
+    rig.emulate(speed=10.0, stations=1)
+    rig.run(configuration(rig.folder, rig.folder / "ports" / "sonar", rig.ports), rate=10.0)
+    rig.wait(lambda: rig.count("ping") > 5)
     assert rig.ask(id=1, do="sonar", gain_pct=30, range_m=5)["ok"] is True
     rig.wait(lambda: newest_gain_pct(rig) == pytest.approx(30, abs=1))
     assert rig.ask(id=2, do="sonar", stop=True)["ok"] is True
     rig.wait(lambda: rig.health()["sonar"]["state"] == "stopped")
     rig.stop()
+    assert events(rig.logs).count("settings") == 2
 
 
 def test_a_lost_port_comes_back_by_itself(rig: Rig) -> None:
