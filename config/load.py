@@ -70,6 +70,8 @@ def _from_pydantic(file: str, raw: dict[str, Any], error: ValidationError) -> li
     """One mistake a key: the branches of a union, told apart by pydantic, are one mistake to a person."""
     mistakes: dict[str, Mistake] = {}
     for each in error.errors(include_url=False):
+        if each["type"] == "default_factory_not_called":
+            continue  # a key that is left out and hangs on one that is wrong
         place, value = _resolve(raw, each["loc"])
         key = _dotted(place)
         if each["type"] == "extra_forbidden":

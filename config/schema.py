@@ -6,14 +6,25 @@ radians begin where the program reads it.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
 Quantity = Literal["heading", "depth", "altitude"]
+FeedDriver = Literal["nmea", "mavlink", "videoray_pro3", "videoray_pro4", "pressure"]
 
 FRESH_WATER_KG_M3 = 997.0
 SEA_WATER_KG_M3 = 1025.0
+STANDARD_GRAVITY_M_S2 = 9.80665
+
+BAUDS: Final[dict[str, int]] = {
+    "nmea": 4800,
+    "mavlink": 57600,
+    "videoray_pro3": 9600,
+    "videoray_pro4": 115200,
+    "pressure": 9600,
+}
+"""What devices of each feed driver usually speak at."""
 
 
 class Section(BaseModel):
@@ -31,6 +42,10 @@ class Site(Section):
     )
     height_m: float | None = Field(None, gt=0, le=100, description="floor to ceiling; absent: from the depths seen")
     declination_deg: float = Field(0.0, ge=-180, le=180, description="added to magnetic headings, east positive")
+    gravity_m_s2: float | None = Field(None, ge=9.7, le=9.9, description="absent: from latitude_deg, else 9.80665")
+    latitude_deg: float | None = Field(None, ge=-90, le=90)
+    temperature_c: float | None = Field(None, ge=0, le=35, description="of the water; sets the speed of sound")
+    salinity_ppt: float | None = Field(None, ge=0, le=45, description="absent: 0 in fresh water, else 35")
 
     @property
     def density_kg_m3(self) -> float:
@@ -60,16 +75,76 @@ class Sonar(Section):
     inverted: bool = Field(False, description="the head hangs upside down")
 
 
+def _usual_baud(known: dict[str, Any]) -> int:
+    return BAUDS.get(known.get("driver", ""), BAUDS["nmea"])
+
+
 class Feed(Section):
-    """A line that tells heading or depth."""
+    """A line that tells heading, depth or altitude.  Keys that only some drivers heed say which."""
 
     name: str = Field("feed", pattern=r"^[a-z][a-z0-9_-]{0,31}$")
-    driver: Literal["nmea"] = "nmea"
-    port: str = Field("/dev/ttyUSB1", min_length=1, description="any pyserial URL")
-    baud: int = Field(4800, ge=300, le=4_000_000)
+    driver: FeedDriver = "nmea"
+    port: str = Field("/dev/ttyUSB1", min_length=1, description="any pyserial URL, or udp://ADDRESS:PORT to listen at")
+    baud: int = Field(
+        default_factory=_usual_baud, ge=300, le=4_000_000, description="absent: what the driver's devices usually speak"
+    )
     provides: tuple[Quantity, ...] = ("heading", "depth")
-    checksum: Literal["require", "warn", "ignore"] = "require"
-    dpt: Literal["vehicle_depth", "altitude"] = Field("vehicle_depth", description="what DPT and DBT sentences mean")
+    latency_ms: float = Field(0.0, ge=0, le=5000, description="age of a measurement when its first byte is sent")
+    stale_after_s: float = Field(2.0, gt=0, le=3600, description="health calls older readings stale")
+
+    heading_reference: Literal["as_said", "magnetic", "true"] = Field(
+        "as_said", description="north of the headings: what the device says, or what the operator knows better"
+    )
+    mount_deg: float = Field(0.0, ge=-180, le=180, description="the compass's ahead, clockwise from the bow")
+    deviation_deg: tuple[tuple[float, float], ...] = Field(
+        (), max_length=72, description="pairs of a magnetic heading as read and what to add to it; turned between"
+    )
+    field_strength: float | None = Field(
+        None, gt=0, le=1e6, description="undisturbed magnetic field, in the compass's own unit"
+    )
+    field_tolerance_pct: float = Field(10.0, gt=0, le=100)
+    max_turn_deg_s: float = Field(180.0, gt=0, le=3600, description="faster turns are jumps of the compass")
+
+    depth_offset_m: float = Field(0.0, ge=-100, le=100, description="added to depths: how far the sonar is below")
+    surface_mbar: float | None = Field(
+        None, ge=500, le=1200, description="absolute pressure at the surface; absent: 1013.25 until a tare"
+    )
+    max_dive_m_s: float = Field(3.0, gt=0, le=100, description="faster dives are jumps of the depth or altitude")
+
+    checksum: Literal["require", "warn", "ignore"] = Field("require", description="nmea")
+    dpt: Literal["vehicle_depth", "altitude"] = Field(
+        "vehicle_depth", description="nmea: what DPT and DBT sentences mean"
+    )
+    talker: str | None = Field(None, pattern=r"^[A-Z]{2}$", description="nmea: of standard sentences; absent: any")
+    variation: Literal["sentence", "site"] = Field(
+        "sentence", description="nmea: a variation in HDG goes before the site's declination, or is left alone"
+    )
+    angle_unit: Literal["auto", "deg", "tenth_deg", "bam16", "mil"] = Field(
+        "auto", description="nmea of compass makers: auto, deg, bam16, mil; videoray_pro4: auto, deg, tenth_deg"
+    )
+    xdr_depth_names: tuple[str, ...] = Field(("DEPTH", "DPTH"), description="nmea: transducers that tell the depth")
+    xdr_pressure_names: tuple[str, ...] = Field((), description="nmea: transducers that tell the water's pressure")
+
+    system: int | None = Field(
+        None, ge=1, le=255, description="mavlink: the vehicle; absent: the first autopilot heard"
+    )
+    heading_from: Literal["attitude", "vfr_hud"] = Field("attitude", description="mavlink")
+    pressure_message: Literal[1, 2, 3] = Field(2, description="mavlink: SCALED_PRESSURE, or its 2 or 3, is the water's")
+
+    depth_points: tuple[tuple[float, float], tuple[float, float]] | None = Field(
+        None, description="videoray_pro3: two pairs of raw count and depth in m; no default is safe"
+    )
+    poll: bool = Field(False, description="videoray_pro4, pressure (keller): ask for data; one program may on a line")
+    poll_hz: float = Field(5.0, gt=0, le=10)
+
+    format: Literal["text", "keller"] = Field("text", description="pressure: lines of text, or Keller's bus")
+    column: int = Field(1, ge=1, le=64, description="pressure (text): the number that counts, from 1")
+    unit: Literal["mbar", "hpa", "bar", "dbar", "kpa", "pa", "psi", "m", "ft"] = Field(
+        "mbar", description="pressure (text): m and ft are depths"
+    )
+    pressure: Literal["absolute", "gauge"] = Field("absolute", description="nmea (XDR), pressure: gauge is 0 in air")
+    address: int = Field(250, ge=1, le=250, description="pressure (keller): 250 is any single sensor")
+    channel: int = Field(1, ge=0, le=5, description="pressure (keller): 0 calculated, 1 P1, 2 P2")
 
 
 class Map(Section):

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Final, Protocol
 
-from config.schema import Config, Feed, Sonar
+from config.schema import Config, Feed, Site, Sonar
 from drivers.counters import Counters
-from drivers.nmea import NmeaDecoder
+from drivers.feed import FeedDecoder
+from drivers.nmea import NmeaReader
 from drivers.readings import Reading
+from drivers.records import Event
+from drivers.statements import Reader
 from drivers.tritech.decoder import TritechDecoder
 
 SONAR_PORT: Final = "sonar"
@@ -26,17 +29,36 @@ class Decoder(Protocol):
         """Take bytes that arrived at ``t_ns`` and return the readings that they complete."""
 
     def finish(self) -> list[Reading]:
-        """End the stream; what is left of it is counted as skipped."""
+        """End the stream, or note that it was interrupted; what is left of a message is counted as skipped."""
 
 
 SONARS: Final[dict[str, Callable[[Sonar], Decoder]]] = {"tritech": TritechDecoder}
-FEEDS: Final[dict[str, Callable[[Feed, float], Decoder]]] = {"nmea": NmeaDecoder}
-"""By the ``driver`` of the configuration; a feed's decoder also takes the declination in degrees."""
+FEEDS: Final[dict[str, Callable[[Feed], Reader]]] = {
+    "nmea": NmeaReader,
+}
+"""By the ``driver`` of the configuration: who reads a line's bytes."""
+
+
+def feed_decoder(feed: Feed, site: Site) -> FeedDecoder:
+    """Make the decoder of one feed."""
+    return FeedDecoder(feed, site, FEEDS[feed.driver](feed))
 
 
 def decoders_for(config: Config) -> dict[str, Decoder]:
     """Make one decoder for each port of the configuration, by the port's name."""
     decoders: dict[str, Decoder] = {SONAR_PORT: SONARS[config.sonar.driver](config.sonar)}
-    for feed in config.feed:
-        decoders[feed.name] = FEEDS[feed.driver](feed, config.site.declination_deg)
-    return decoders
+    return decoders | {feed.name: feed_decoder(feed, config.site) for feed in config.feed}
+
+
+def heed(decoders: Mapping[str, Decoder], event: Event) -> list[Reading]:
+    """Tell decoders what an event of the log means to them; return the readings that it completes.
+
+    What comes from a port after it was lost does not go on with what came before; a ``tare`` is the pressure at the
+    surface, from then on.
+    """
+    decoder, surface_mbar = decoders.get(str(event.fields.get("port"))), event.fields.get("surface_mbar")
+    if event.kind == "port_lost" and decoder is not None:
+        return decoder.finish()
+    if event.kind == "tare" and isinstance(decoder, FeedDecoder) and isinstance(surface_mbar, float | int):
+        decoder.tare(surface_mbar)
+    return []

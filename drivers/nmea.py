@@ -1,92 +1,78 @@
-"""From the lines of an NMEA 0183 instrument to headings, depths and altitudes.
-
-A magnetic heading becomes one from true north with the variation that the same feed tells in HDG, or else with the
-configured declination: one of the two, once.  A sentence that says its heading is true is taken at its word.
-"""
+"""From the lines of an NMEA 0183 instrument to what they say about heading, depth and altitude."""
 
 from __future__ import annotations
 
-import math
 from collections import Counter
+from dataclasses import replace
 
 from config.errors import FrameError
 from config.schema import Feed
 from drivers.counters import Counters
+from drivers.nmea_fields import Dialect
 from drivers.nmea_lines import Sentence, SentenceReader
-from drivers.nmea_sentences import WITHOUT_CHECKSUM, Said, Statement, read
-from drivers.readings import Altitude, Depth, Heading, Reading
+from drivers.nmea_proprietary import WITHOUT_CHECKSUM
+from drivers.nmea_sentences import read
+from drivers.statements import Message
+from drivers.wire import byte_ns
 
 
-class NmeaDecoder:
-    """Readings of one feed, of the quantities that it provides; each is dated at the first byte of its sentence.
+class NmeaReader:
+    """Messages of one line; sentences that say nothing about heading or depth are counted as ``other``.
 
-    ``checksum``: ``require`` refuses a sentence without a right one, ``warn`` counts and takes it, ``ignore`` does not
-    look.  An empty checksum (``*`` and the end of the line) counts as none.
+    ``checksum``: ``require`` refuses a sentence without a right one, ``warn`` counts and takes it as suspect,
+    ``ignore`` does not look.  An empty checksum (``*`` and the end of the line) counts as none.
     """
 
-    def __init__(self, feed: Feed, declination_deg: float) -> None:
-        self._feed = feed
-        self._variation_deg = declination_deg
-        self._reader = SentenceReader()
+    def __init__(self, feed: Feed) -> None:
+        self._checksum = feed.checksum
+        self._dialect = Dialect(
+            angle_unit=feed.angle_unit,
+            depth_names=frozenset(name.upper() for name in feed.xdr_depth_names),
+            pressure_names=frozenset(name.upper() for name in feed.xdr_pressure_names),
+            talker=feed.talker or "",
+        )
+        self._lines = SentenceReader(byte_ns(feed))
         self._frames: Counter[str] = Counter()
         self._bad: Counter[str] = Counter()
 
     @property
     def counters(self) -> Counters:
-        """What was seen so far; sentences that say nothing about heading or depth are ``other``."""
-        return Counters(dict(self._frames), self._reader.skipped, dict(self._reader.bad + self._bad))
+        """What was seen so far; sentences that begin with ``!`` (AIS) are ``encapsulated``."""
+        return Counters(dict(self._frames), self._lines.skipped, dict(self._lines.bad + self._bad))
 
-    def push(self, t_ns: int, data: bytes) -> list[Reading]:
-        """Take bytes that arrived at ``t_ns`` and return the readings that they complete."""
-        return [reading for sentence in self._reader.push(t_ns, data) for reading in self._read(sentence)]
+    def push(self, t_ns: int, data: bytes) -> list[Message]:
+        """Take bytes that arrived at ``t_ns`` and return the messages that they complete."""
+        return [message for each in self._lines.push(t_ns, data) for message in self._read(each)]
 
-    def finish(self) -> list[Reading]:
+    def finish(self) -> list[Message]:
         """End the stream: a last sentence without end of line counts if its checksum is right."""
-        return [reading for sentence in self._reader.finish() for reading in self._read(sentence)]
+        return [message for each in self._lines.finish() for message in self._read(each)]
 
-    def _read(self, sentence: Sentence) -> list[Reading]:
+    def _read(self, sentence: Sentence) -> list[Message]:
         address, *fields = sentence.body.decode("ascii").split(",")
-        if not self._accepts(sentence, address):
+        reason = self._objection(sentence, address)
+        if reason and self._checksum == "require":
+            return []
+        if sentence.encapsulated:
+            self._frames["encapsulated"] += 1
             return []
         try:
-            said = read(address, fields)
+            said = read(address, fields, self._dialect)
         except FrameError:
             self._bad["field"] += 1
             return []
         name, statements = said or ("other", [])
         self._frames[name] += 1
-        readings = (self._reading(sentence.t_ns, name, each) for each in statements)
-        return [reading for reading in readings if reading is not None]
+        if reason:
+            statements = [
+                each if each.reason else replace(each, quality="suspect", reason=reason) for each in statements
+            ]
+        return [Message(sentence.t_ns, name, tuple(statements))] if statements else []
 
-    def _accepts(self, sentence: Sentence, address: str) -> bool:
-        verdict, rule = sentence.checksum, self._feed.checksum
-        if verdict == "right" or rule == "ignore" or (verdict == "absent" and address in WITHOUT_CHECKSUM):
-            return True
+    def _objection(self, sentence: Sentence, address: str) -> str:
+        """Count and return what is wrong with the checksum, if that matters."""
+        verdict = sentence.checksum
+        if verdict == "right" or self._checksum == "ignore" or (verdict == "absent" and address in WITHOUT_CHECKSUM):
+            return ""
         self._bad["checksum" if verdict == "wrong" else "no_checksum"] += 1
-        return rule == "warn"
-
-    def _reading(self, t_ns: int, name: str, statement: Statement) -> Reading | None:
-        value, source = statement.value, f"{self._feed.name}:{name}"
-        wanted = self._feed.provides
-        match statement.what:
-            case Said.VARIATION:
-                self._variation_deg = value
-            case Said.MAGNETIC if "heading" in wanted:
-                return Heading(t_ns, _rad(value + self._variation_deg), source)
-            case Said.TRUE if "heading" in wanted:
-                return Heading(t_ns, _rad(value), source)
-            case what if what in self._depths() and "depth" in wanted:
-                return Depth(t_ns, value, source)
-            case what if what in self._altitudes() and "altitude" in wanted:
-                return Altitude(t_ns, value, source)
-        return None
-
-    def _depths(self) -> tuple[Said, ...]:
-        return (Said.DEPTH, Said.BELOW_SURFACE) if self._feed.dpt == "vehicle_depth" else (Said.DEPTH,)
-
-    def _altitudes(self) -> tuple[Said, ...]:
-        return (Said.ALTITUDE, Said.ABOVE_FLOOR) if self._feed.dpt == "altitude" else (Said.ALTITUDE,)
-
-
-def _rad(heading_deg: float) -> float:
-    return math.radians(heading_deg % 360.0) % math.tau
+        return "wrong checksum" if verdict == "wrong" else "no checksum"

@@ -8,9 +8,13 @@ taken where the first byte of the reading arrived.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+Quality = Literal["good", "suspect", "bad"]
+"""How far a reading is to be trusted: ``suspect`` ones are used and shown, ``bad`` ones are counted and shown only."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +58,8 @@ class Heading:
     t_ns: int
     heading_rad: float
     source: str
+    quality: Quality = "good"
+    reason: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +69,8 @@ class Depth:
     t_ns: int
     depth_m: float
     source: str
+    quality: Quality = "good"
+    reason: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +80,13 @@ class Altitude:
     t_ns: int
     altitude_m: float
     source: str
+    quality: Quality = "good"
+    reason: str = ""
 
 
 Reading = Ping | Heading | Depth | Altitude
+
+
+def is_usable(reading: Reading) -> bool:
+    """Tell whether a map may be made of a reading: its device, or what came before it, do not speak against it."""
+    return isinstance(reading, Ping) or reading.quality != "bad"

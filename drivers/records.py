@@ -25,7 +25,7 @@ class Event:
     """Something that happened to the program or that a person said: ``kind`` and its fields.
 
     Kinds: ``started``, ``stopped``, ``port_opened``, ``port_lost``, ``settings``, ``mark``, ``hint``, ``drop``,
-    ``note``, ``disk``.  The map may depend on an event only through the log.
+    ``note``, ``tare``, ``disk``.  The map may depend on an event only through the log.
     """
 
     t_ns: int

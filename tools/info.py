@@ -162,6 +162,9 @@ def _port_text(name: str, port: dict[str, Any]) -> Iterator[str]:
         kinds = ", ".join(f"{kind} {count}" for kind, count in sorted(port["messages"].items())) or "no messages"
         bad = "".join(f", bad {reason} {count}" for reason, count in sorted(port["bad"].items()))
         yield f"             {kinds}{bad}, {port['skipped_bytes']} bytes skipped"
+        doubtful = [f"{count} {name}" for name, count in sorted(port["quality"].items()) if name != "good"]
+        if doubtful:
+            yield f"             readings: {', '.join(doubtful)}; last because of {port['last_reason']}"
 
 
 def _sonar_text(sonar: dict[str, Any]) -> Iterator[str]:

@@ -8,8 +8,9 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Final
 
 from config.schema import Config
-from drivers.decoders import Decoder, decoders_for
-from drivers.readings import Altitude, Depth, Heading, HeadSettings, Ping, Reading
+from drivers.decoders import Decoder, decoders_for, heed
+from drivers.quality import Tally
+from drivers.readings import Altitude, Depth, Heading, HeadSettings, Ping, Reading, is_usable
 from drivers.records import Chunk, ClockPair, Event, Record
 
 GAP_S: Final = 2.0
@@ -153,6 +154,7 @@ class PortFacts:
     rx: Direction = field(default_factory=Direction)
     tx: Direction = field(default_factory=Direction)
     decoder: Decoder | None = None
+    tally: Tally = field(default_factory=Tally)
 
 
 class SessionFacts:
@@ -196,15 +198,20 @@ class SessionFacts:
         (facts.rx if chunk.direction == "rx" else facts.tx).take(at_s, len(chunk.data))
         if facts.decoder is not None and chunk.direction == "rx":
             for reading in facts.decoder.push(chunk.t_ns, chunk.data):
+                facts.tally.take(reading)
                 self._reading(reading)
 
     def _event(self, at_s: float, event: Event) -> None:
         self.events[event.kind] += 1
         if len(self.first_events) < _KEPT:
             self.first_events.append({"at_s": round(at_s, 3), "kind": event.kind, "fields": event.fields})
+        for reading in heed(self._decoders, event):
+            self._reading(reading)
 
     def _reading(self, reading: Reading) -> None:
         at_s = self._since(reading.t_ns)
+        if not is_usable(reading):
+            return
         match reading:
             case Ping():
                 self.turning.take(at_s, reading)
@@ -230,4 +237,5 @@ def port_body(facts: PortFacts, duration_s: float) -> dict[str, Any]:
     if facts.decoder is not None:
         counters = facts.decoder.counters
         body |= {"messages": dict(counters.frames), "bad": dict(counters.bad), "skipped_bytes": counters.skipped_bytes}
+        body |= {"quality": dict(facts.tally.counts), "last_reason": facts.tally.last_reason}
     return body

@@ -39,7 +39,11 @@ def test_shipped_defaults_are_the_schema_s_defaults() -> None:
 def uncommented() -> str:
     """The default file with its optional keys and its feed switched on."""
     lines = DEFAULT.read_text().splitlines()
-    keys = [line.removeprefix("# ") if (" = " in line or "[[" in line[:4]) else line for line in lines]
+    optional = [line.startswith("# ") and not line.startswith("#  ") for line in lines]
+    keys = [
+        line.removeprefix("# ") if free and (" = " in line or "[[" in line[:4]) else line
+        for line, free in zip(lines, optional, strict=True)
+    ]
     return "\n".join(line for line in keys if not line.startswith("#"))
 
 
@@ -50,6 +54,9 @@ def test_shipped_file_names_every_key() -> None:
     for name in set(fields) - {"feed"}:
         assert set(raw[name]) == set(type(getattr(Config(), name)).model_fields), name
     assert Feed(**raw["feed"][0]) == Feed()
+    without_default = {name for name, field in Feed.model_fields.items() if field.default is None}
+    assert set(raw["feed"][0]) == set(Feed.model_fields) - without_default
+    assert all(f"#   {name} = " in DEFAULT.read_text() for name in without_default)
 
 
 def test_every_mistake_is_told_at_once(write: Write) -> None:
@@ -65,7 +72,9 @@ def test_every_mistake_is_told_at_once(write: Write) -> None:
     assert text["sonar.range_m"].endswith("got 1000, expected a number from 0.3 to 300")
     assert text["sonar.baud"].endswith("got 'fast', expected a whole number from 1200 to 4000000")
     assert text["sonar.cell_m"].endswith("'cell_m' belongs to [map]")
-    assert text["feed[0].driver"].endswith("got 'nmae', expected 'nmea'")
+    assert text["feed[0].driver"].endswith(
+        "got 'nmae', expected 'nmea' or 'mavlink' or 'videoray_pro3' or 'videoray_pro4' or 'pressure'"
+    )
     assert "feed[0].provides[1]" in text
     assert "did you mean 'map'?" in text["maap"]
     assert all("dive.toml: " in line for line in lines)

@@ -12,10 +12,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from config.schema import Config, Feed, Quantity
+from config.schema import Config, Feed, Quantity, Site
 from drivers.counters import Counters
-from drivers.decoders import decoders_for
-from drivers.nmea import NmeaDecoder
+from drivers.decoders import decoders_for, feed_decoder
 from drivers.nmea_lines import LONGEST, SentenceReader, xor
 from drivers.readings import Altitude, Depth, Heading, Reading
 
@@ -27,13 +26,13 @@ def feed(
     dpt: Literal["vehicle_depth", "altitude"] = "vehicle_depth",
     provides: tuple[Quantity, ...] = ALL,
 ) -> Feed:
-    return Feed(name="feed", checksum=checksum, dpt=dpt, provides=provides)
+    return Feed(port="socket://x", checksum=checksum, dpt=dpt, provides=provides)
 
 
 def run(
     pieces: Sequence[tuple[int, bytes]], using: Feed | None = None, declination: float = 0.0
 ) -> tuple[list[Reading], Counters]:
-    decoder = NmeaDecoder(using or feed(), declination)
+    decoder = feed_decoder(using or feed(), Site(declination_deg=declination))
     readings = [reading for t_ns, data in pieces for reading in decoder.push(t_ns, data)]
     readings += decoder.finish()
     return readings, decoder.counters
@@ -51,11 +50,11 @@ def said(body: str, using: Feed | None = None, declination: float = 0.0) -> list
 
 def plain(reading: Reading) -> tuple[str, float]:
     match reading:
-        case Heading(_, heading_rad, _):
+        case Heading(heading_rad=heading_rad):
             return "heading", round(math.degrees(heading_rad), 6)
-        case Depth(_, depth_m, _):
+        case Depth(depth_m=depth_m):
             return "depth", round(depth_m, 6)
-        case Altitude(_, altitude_m, _):
+        case Altitude(altitude_m=altitude_m):
             return "altitude", round(altitude_m, 6)
     raise AssertionError(reading)
 
@@ -97,7 +96,7 @@ def plain(reading: Reading) -> tuple[str, float]:
         ("VWVHW,10,T,338.9,M,0.0,N,0.0,K", [("heading", 10.0)]),
         ("PTNTHPR,354.9,N,5.2,N,0.2,N", [("heading", 354.9)]),
         ("PTNTHPR,85.9,O,-0.9,N,0.8,N", [("heading", 85.9)]),
-        ("PTNTHPR,85.9,P,-0.9,N,0.8,N", []),
+        ("PTNTHPR,85.9,P,-0.9,N,0.8,N", [("heading", 85.9)]),
         ("PTNTHTM,71.3,N,-0.4,N,-1.4,N,75.9,2618", [("heading", 71.3)]),
         ("PTNTHTM,14223,N,169,N,-43,N,13641,2454", [("heading", 78.129272)]),
         ("PTNTHTM,169,N,12,N,-43,N,13641,2454", [("heading", 0.928345)]),
@@ -235,8 +234,8 @@ def test_own_vectors(shared_data: Path) -> None:
     data = "".join(each.split("\t")[0] + "\r\n" for each in lines if not each.startswith("#"))
     readings, counters = run([(0, data.replace("\\x00", "\0").encode())])
     assert counters.bad == {"checksum": 2, "no_checksum": 1, "garbled": 1}
-    # 30 sentences with one value, 3 with two; both depths without or with a wrong sum are left out.
-    assert len(readings) == 36
+    # 32 sentences with one value, 4 with two; both depths without or with a wrong sum are left out.
+    assert len(readings) == 40
 
 
 def test_hub_of_a_vehicle(shared_data: Path) -> None:
@@ -249,7 +248,7 @@ def test_hub_of_a_vehicle(shared_data: Path) -> None:
 
 
 def test_decoders_of_a_configuration() -> None:
-    config = Config(feed=(Feed(name="compass"), Feed(name="sounder")))
+    config = Config(feed=(Feed(name="compass", port="socket://x:1"), Feed(name="sounder")))
     decoders = decoders_for(config)
     assert list(decoders) == ["sonar", "compass", "sounder"]
     (reading,) = decoders["compass"].push(5, line("HCHDM,90.0,M"))

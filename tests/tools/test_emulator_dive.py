@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from config.errors import LogError
-from config.schema import Feed, Sonar
-from drivers.nmea import NmeaDecoder
+from config.schema import Feed, Site, Sonar
+from drivers.decoders import feed_decoder
 from drivers.readings import Depth, Heading, Ping
 from drivers.tritech.decoder import TritechDecoder
 from tools.cli import main
@@ -93,7 +93,7 @@ def test_scan_shows_the_wall_where_the_truth_has_it(recorded: tuple[Dive, list[P
 
 def test_feed_tells_heading_and_depth_of_the_stop(recorded: tuple[Dive, list[Piece]]) -> None:
     dive, pieces = recorded
-    decoder = NmeaDecoder(Feed(), 0.0)
+    decoder = feed_decoder(Feed(), Site())
     readings = [r for piece in pieces if piece.port == "feed" for r in decoder.push(piece.t_ns, piece.data)]
     rest = dive.vehicle.rests[1]
     assert rest.to_ns is not None

@@ -7,8 +7,8 @@ from math import degrees, radians
 import numpy as np
 import pytest
 
-from config.schema import Feed
-from drivers.nmea import NmeaDecoder
+from config.schema import Feed, Site
+from drivers.decoders import feed_decoder
 from drivers.readings import Depth, Heading, Reading
 from tools.emulator.echoes import Place
 from tools.emulator.feeds import FeedOptions, NmeaFeed
@@ -20,7 +20,7 @@ MS = 1_000_000
 def listen(options: FeedOptions, heading_deg: float, seconds: float = 20.0) -> tuple[list[Reading], int]:
     place = Place(0.0, 0.0, 1.3, radians(heading_deg))
     feed = NmeaFeed(lambda _: place, np.random.default_rng(3), options)
-    decoder = NmeaDecoder(Feed(), 0.0)
+    decoder = feed_decoder(Feed(), Site())
     readings: list[Reading] = []
     count = 0
     for step in range(1, int(seconds * 100) + 1):

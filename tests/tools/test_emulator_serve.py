@@ -16,8 +16,8 @@ from subprocess import Popen
 import pytest
 
 from config.errors import InputError, PortError
-from config.schema import Feed, Sonar
-from drivers.nmea import NmeaDecoder
+from config.schema import Feed, Site, Sonar
+from drivers.decoders import feed_decoder
 from drivers.readings import Depth, Heading, Reading
 from drivers.tritech.decoder import TritechDecoder
 from drivers.tritech.head import Head
@@ -33,7 +33,7 @@ class Host:
     def __init__(self, folder: Path) -> None:
         self.readings: list[Reading] = []
         self.decoder = TritechDecoder(Sonar())
-        self._feed_decoder = NmeaDecoder(Feed(), 0.0)
+        self._feed_decoder = feed_decoder(Feed(), Site())
         self._head = Head(Sonar())
         self._sonar, self._feed = (_open(folder / name) for name in ("sonar", "feed"))
         self._start = time.monotonic()

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final
 
-from config.schema import Feed, Quantity
-from drivers.decoders import FEEDS, Decoder
+from config.schema import Feed, Quantity, Site
+from drivers.decoders import FEEDS, Decoder, feed_decoder
 from drivers.readings import Altitude, Depth, Heading, Reading
 from drivers.tritech.framing import Deframer, Frame
 from drivers.tritech.headdata import HeadData, decode_head_data
@@ -99,7 +99,7 @@ class _FeedProbe:
 def _listener(driver: str, checksum: str) -> Decoder:
     everything = list(QUANTITIES.values())
     feed = Feed.model_validate({"driver": driver, "checksum": checksum, "provides": everything})
-    return FEEDS[feed.driver](feed, 0.0)
+    return feed_decoder(feed, Site())
 
 
 def _quantities(readings: Iterable[Reading]) -> set[Quantity]:
