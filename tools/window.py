@@ -1,8 +1,9 @@
 """The Open3D window, in a process of its own: a failure of drivers or libraries there ends nothing else.
 
 ``python -m tools.window [PICTURE]`` reads meshes from standard input, each as eight bytes of length (little-endian) and
-a PLY file's bytes, and shows the newest.  With PICTURE it saves one picture of the first mesh and ends.  What is wrong
-comes as one line on standard error that begins with ``MARK``: drivers and libraries write there too.
+a PLY file's bytes, and shows the newest until it is closed or its input ends: whoever started it is then gone.  With
+PICTURE it saves one picture of the first mesh and ends.  What is wrong comes as one line on standard error that begins
+with ``MARK``: drivers and libraries write there too.
 """
 
 from __future__ import annotations
@@ -99,13 +100,16 @@ def missing_library(reason: str) -> str:
     return f"the 3D window needs the system library {library}; {how}"
 
 
-def _arrivals(source: int) -> queue.Queue[Mesh]:
-    """Meshes as they come; a reader of its own keeps the sender from waiting for the window."""
-    arrived: queue.Queue[Mesh] = queue.Queue()
+def _arrivals(source: int) -> queue.Queue[Mesh | None]:
+    """Meshes as they come, None at the end; a reader of its own keeps the sender from waiting for the window."""
+    arrived: queue.Queue[Mesh | None] = queue.Queue()
 
     def read() -> None:
-        while len(length := _exactly(source, 8)) == 8:
-            arrived.put(parse_ply(_exactly(source, int.from_bytes(length, "little"))))
+        try:
+            while len(length := _exactly(source, 8)) == 8:
+                arrived.put(parse_ply(_exactly(source, int.from_bytes(length, "little"))))
+        finally:
+            arrived.put(None)
 
     threading.Thread(target=read, daemon=True).start()
     return arrived
@@ -119,7 +123,7 @@ def _exactly(source: int, count: int) -> bytes:
     return bytes(data)
 
 
-def _show(open3d: ModuleType, arrived: queue.Queue[Mesh], picture: Path | None) -> None:
+def _show(open3d: ModuleType, arrived: queue.Queue[Mesh | None], picture: Path | None) -> None:
     window = open3d.visualization.Visualizer()
     if not window.create_window(TITLE, *_SIZE, visible=picture is None):
         raise WindowError("no OpenGL window can be opened here; apt-get install libgl1-mesa-dri, or 'lacuna dashboard'")
@@ -129,23 +133,30 @@ def _show(open3d: ModuleType, arrived: queue.Queue[Mesh], picture: Path | None) 
     first = True
     try:
         while window.poll_events():
-            if (mesh := _newest(arrived)) is not None:
+            mesh, is_over = _newest(arrived)
+            if mesh is not None:
                 _draw(open3d, window, mesh, first)
                 first = False
             window.update_renderer()
             if picture is not None and not first:
                 window.capture_screen_image(str(picture), do_render=True)
                 return
+            if is_over:
+                return
             time.sleep(_FRAME_S)
     finally:
         window.destroy_window()
 
 
-def _newest(arrived: queue.Queue[Mesh]) -> Mesh | None:
+def _newest(arrived: queue.Queue[Mesh | None]) -> tuple[Mesh | None, bool]:
+    """Return the newest mesh that waits, if any, and whether no more will come."""
     mesh = None
     while not arrived.empty():
-        mesh = arrived.get()
-    return mesh
+        following = arrived.get()
+        if following is None:
+            return mesh, True
+        mesh = following
+    return mesh, False
 
 
 def _draw(open3d: ModuleType, window: Any, mesh: Mesh, first: bool) -> None:  # noqa: ANN401 - Open3D has no types

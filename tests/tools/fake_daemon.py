@@ -1,6 +1,6 @@
 """A daemon whose sockets are real and whose site is made up: a keyhole-shaped cistern with a pillar and two holes.
 
-``FakeDaemon`` serves it in a thread; as a program, ``python tests/tools/fake_daemon.py [PORT]``, it runs until Ctrl-C.
+``FakeDaemon`` serves it in a thread; as a program, ``python -m tests.tools.fake_daemon [PORT]``, it runs until Ctrl-C.
 """
 
 from __future__ import annotations

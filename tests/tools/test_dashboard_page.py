@@ -9,13 +9,13 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
-from fake_daemon import FakeDaemon
-from live_page import Dashboard, dashboard, free_port
 from numpy.typing import NDArray
 from PIL import Image
 from playwright.sync_api import Browser, Locator, Page, Request, expect, sync_playwright
 
 from daemon.snapshots import Snapshot
+from tests.tools.fake_daemon import FakeDaemon
+from tests.tools.live_page import Dashboard, dashboard, free_port
 
 FLAGS = [
     "--headless=new", "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--no-first-run",

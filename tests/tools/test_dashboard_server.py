@@ -13,14 +13,14 @@ from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
-from fake_daemon import FakeDaemon
-from live_page import Dashboard, dashboard, free_port, lacuna
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
 import tools.dashboard.server
 from daemon.snapshots import Snapshot
+from tests.tools.fake_daemon import FakeDaemon
+from tests.tools.live_page import Dashboard, dashboard, free_port, lacuna
 
 
 @pytest.fixture(scope="module")

@@ -14,12 +14,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fake_daemon import FakeDaemon, mesh
-from live_page import free_port, lacuna
 from numpy.typing import NDArray
 from PIL import Image, ImageGrab
 
 from fill.values import FILLED, MEASURED
+from tests.tools.fake_daemon import FakeDaemon, mesh
+from tests.tools.live_page import free_port, lacuna
 from tools.ply import ply_bytes
 from tools.view import measured_only
 from tools.window import APT, missing_library

@@ -30,7 +30,7 @@ export function duration(seconds) {
 
 function number(value) {
   if (typeof value !== "number" || Number.isInteger(value)) return String(value);
-  return Math.abs(value) >= 10 ? value.toFixed(0) : String(+value.toPrecision(3));
+  return Math.abs(value) >= 100 ? value.toFixed(0) : String(+value.toPrecision(3));
 }
 
 /** `rx_bytes_s: 3120` as "3120 rx bytes/s": units stand at the end of the names. */
