@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import io
 import shutil
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from PIL import Image
-from playwright.sync_api import Browser, Locator, Page, Request, expect, sync_playwright
+from playwright.sync_api import Browser, Page, Request, expect, sync_playwright
 
 from daemon.snapshots import Snapshot
 from tests.tools.fake_daemon import FakeDaemon
 from tests.tools.live_page import Dashboard, dashboard, free_port
+from tests.tools.sight import near, on_plan, orange, orange_share, picture, until
 
 FLAGS = [
     "--headless=new", "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--no-first-run",
@@ -70,36 +69,6 @@ def page(chromium: Browser, served: Dashboard) -> Iterator[Page]:
     assert wrong == []
 
 
-def picture(of: Locator) -> NDArray[np.uint8]:
-    return np.asarray(Image.open(io.BytesIO(of.screenshot())).convert("RGB"))
-
-
-def near(pixels: NDArray[np.uint8], colour: tuple[int, int, int], within: int = 12) -> NDArray[np.bool_]:
-    return np.asarray((np.abs(pixels.astype(int) - colour) <= within).all(axis=-1))
-
-
-def until(seen: Callable[[], bool], seconds: float = 20) -> None:
-    end = time.monotonic() + seconds
-    while not seen():
-        assert time.monotonic() < end, "it is not to be seen"
-        time.sleep(0.1)
-
-
-def on_plan(page: Page, x_m: float, y_m: float) -> tuple[int, int]:
-    """Pixel of a place, worked out from the plan's own words under the pointer at two corners."""
-    box = page.locator("#plan").bounding_box()
-    assert box is not None
-
-    def place(px: float, py: float) -> tuple[float, float]:
-        page.mouse.move(box["x"] + px, box["y"] + py)
-        page.wait_for_timeout(120)
-        east, north = page.locator("#plan-readout").inner_text().split("·")[:2]
-        return float(east.split()[0]), float(north.split()[0])
-
-    (x0, y0), (x1, y1) = place(10, 100), place(510, 400)
-    return round(10 + 500 * (x_m - x0) / (x1 - x0)), round(100 + 300 * (y_m - y0) / (y1 - y0))
-
-
 def test_heading_depth_and_settings_stand_as_numbers(page: Page) -> None:
     expect(page.locator("#depth")).to_have_text("1.37m")
     expect(page.locator("#range")).to_have_text("8.0m")
@@ -120,7 +89,7 @@ def test_plan_shows_wall_water_unknown_and_fill_where_they_are(page: Page) -> No
     px, py = on_plan(page, 4.1, 0.0)
     fill = picture(page.locator("#plan"))[py - 3 : py + 4, px - 12 : px + 13]
     assert not near(fill, WALL).any(), "a fill must not look measured"
-    assert 0.1 < _orange(fill).mean() < 0.9, "a fill is hatched"
+    assert 0.1 < orange(fill).mean() < 0.9, "a fill is hatched"
 
 
 def test_a_surer_fill_is_stronger(page: Page) -> None:
@@ -192,15 +161,6 @@ def test_mesh_in_three_dimensions_and_measured_only(page: Page) -> None:
     expect(page.locator("#legend-floor")).to_be_visible()
     page.keyboard.press("1")
     expect(page.locator("#plan")).to_be_visible()
-
-
-def orange_share(page: Page) -> float:
-    return float(_orange(picture(page.locator("#mesh"))).mean())
-
-
-def _orange(pixels: NDArray[np.uint8]) -> NDArray[np.bool_]:
-    red, blue = pixels[..., 0].astype(int), pixels[..., 2].astype(int)
-    return np.asarray(red > blue + 70)
 
 
 def test_ports_have_a_lamp_and_a_word(page: Page) -> None:
