@@ -11,7 +11,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 BROWSER_PACKAGES := chromium
-WINDOW_PACKAGES := xvfb libusb-1.0-0 libegl1 libgl1 libx11-6 libgomp1 libvulkan1 mesa-vulkan-drivers
+WINDOW_PACKAGES := xvfb libusb-1.0-0 libegl1 libgl1 libx11-6 libudev1 libidn2-0
 
 .PHONY: install demo test test-slow check bench clean
 
