@@ -67,6 +67,8 @@ class Sonar(Section):
     gain_pct: float = Field(50.0, ge=0, le=100)
     sound_speed_m_s: float = Field(1481.0, ge=1350, le=1650)
     head_type: Literal["dst", "non-dst"] = "dst"
+    dual_channel: bool = Field(False, description="the head has two frequencies: set it with the gains of both")
+    channel: Literal["low", "high"] = Field("low", description="which frequency of a head that has two")
     node: int = Field(2, ge=1, le=254)
     sector_deg: tuple[float, float] | None = Field(
         None, description="left and right limit, clockwise from the bow; absent: full circle"

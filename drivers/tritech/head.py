@@ -6,17 +6,28 @@ from typing import Final
 
 from config.errors import FrameError
 from config.schema import Sonar
-from drivers.tritech.commands import Command, ReBoot, SendBBUser, SendData, SendVersion, encode_command
+from drivers.tritech.commands import (
+    Command,
+    GainCommand,
+    ReBoot,
+    SendBBUser,
+    SendData,
+    SendVersion,
+    encode_command,
+)
 from drivers.tritech.framing import Deframer, Frame
 from drivers.tritech.headdata import HeadData, HeadStatus
 from drivers.tritech.messages import Alive, BBUserData, Message, VersionData, decode
+from drivers.tritech.pace import Limits
 from drivers.tritech.requests import RequestLoop
-from drivers.tritech.settings import head_command, matches
+from drivers.tritech.settings import gains, head_command, matches
 from drivers.tritech.states import SECOND_NS, STEPS, TRANSITIONS, Event, Sends, State, event_of
 
 _HUSH_NS: Final = 12 * SECOND_NS
 _FLAGGED_PINGS: Final = 2
-_OLD_PINGS: Final = 4
+_OLD_PINGS: Final = 6
+"""Replies with old settings after a change: those that two requests may owe, and two that the head works on."""
+
 _RESENDS: Final = 2
 _LOSSES: Final = 3
 _LOST: Final = HeadStatus.POWER_LOST | HeadStatus.MOTOR_ERROR
@@ -45,7 +56,8 @@ class Head:
         self._due_ns = 0
         self._tries = 0
         self._heard_ns = 0
-        self._refused = self._half_duplex = self._change_waits = False
+        self._refused = False
+        self._news: Command | None = None
         self._old = self._resent = self._losses = self._flagged = 0
 
     @property
@@ -68,15 +80,31 @@ class Head:
         self._start_clock(t_ns)
         return self._hear(t_ns, self._deframer.expire(t_ns)) + self._act(t_ns)
 
+    @property
+    def ping_s(self) -> float | None:
+        """Measured time from ping to ping, or None where it is not known."""
+        return self._requests.pace.ping_s if self._state is State.SCANNING else None
+
+    @property
+    def limits(self) -> Limits:
+        """What sound and line need for a ping."""
+        return self._requests.limits
+
     def change(self, sonar: Sonar) -> None:
-        """Set the head differently, from the next `tick` or `push` on; half duplex, after the ping under way."""
+        """Set the head differently, from the next `tick` or `push` on; half duplex, after the ping under way.
+
+        A scanning head is asked on without a pause: a few replies may still have the old settings.  A change of the
+        gain alone goes out as such; a head that does not take either is set anew like one that lost its settings.
+        """
+        is_gain = sonar == self._sonar.model_copy(update={"gain_pct": sonar.gain_pct})
         self._sonar = sonar
         self._command = head_command(sonar)
         self._old = self._resent = 0
         self.settings_differ = False
-        if self._state is State.SCANNING and self._half_duplex and self._requests.owed:
-            self._change_waits = True
-        elif self._state in (State.SETTING, State.SCANNING):
+        if self._state is State.SCANNING:
+            is_gain = is_gain and (self._news is None or isinstance(self._news, GainCommand))
+            self._news = GainCommand(gains(sonar)) if is_gain else self._command
+        elif self._state is State.SETTING:
             self._go(State.SETTING, None)
 
     def stop(self) -> None:
@@ -97,7 +125,7 @@ class Head:
     def _go(self, state: State, t_ns: int | None) -> None:
         """Enter a state; without a time, at the next one given."""
         self._state = state
-        self._change_waits = False
+        self._news = None
         self._tries = 0
         self._entered_ns = t_ns
         self._due_ns = 0 if t_ns is None else t_ns + STEPS[state].first_ns
@@ -133,7 +161,6 @@ class Head:
                 event = Event.VERSION
             case BBUserData():
                 self.user_block = message
-                self._half_duplex = message.half_duplex
                 self._requests.set_half_duplex(half_duplex=message.half_duplex)
                 event = Event.USER_BLOCK
             case HeadData():
@@ -147,10 +174,17 @@ class Head:
 
     def _answered(self, t_ns: int) -> bytes:
         more = self._requests.answered(t_ns)
-        if self._change_waits:
-            self._go(State.SETTING, t_ns)
+        return self._tell_news() + (self._request(t_ns) if more else b"")
+
+    def _tell_news(self) -> bytes:
+        """Return the command that changes a scanning head, if there is one and the line is free."""
+        news = self._news
+        if news is None or not self._requests.may_speak:
             return b""
-        return self._request(t_ns) if more else b""
+        self._news = None
+        if not isinstance(news, GainCommand):
+            self._requests.change(self._command.parameters, self._sonar.baud)
+        return encode_command(news, self._sonar.node)
 
     def _judge(self, data: HeadData) -> Event | None:
         """Compare a ping with the settings sent; a few old ones may still be on their way after a change."""
@@ -166,7 +200,7 @@ class Head:
             self.settings_differ = False
             return Event.PING
         self._old += 1
-        if self._state is not State.SCANNING or self._old <= _OLD_PINGS:
+        if self._state is not State.SCANNING or self._old <= _OLD_PINGS or self._news is not None:
             return None
         if self._resent >= _RESENDS:
             # The head sets itself otherwise than it was told: better its pings than none.
@@ -174,6 +208,9 @@ class Head:
             return Event.PING
         self._old = 0
         self._resent += 1
+        if self._resent == 1:
+            self._news = self._command
+            return None
         return Event.LOST
 
     def _act(self, t_ns: int) -> bytes:
@@ -182,7 +219,7 @@ class Head:
             self._go(State.SILENT, t_ns)
         step = STEPS[self._state]
         if self._state is State.SCANNING:
-            return self._ask(t_ns, step.tries)
+            return self._tell_news() + self._ask(t_ns, step.tries)
         if t_ns < self._due_ns:
             return b""
         if self._tries >= step.tries:
@@ -204,10 +241,10 @@ class Head:
         if not self._requests.is_overdue(t_ns):
             return b""
         self._requests.missed()
-        if self._change_waits or self._requests.unanswered >= patience:
+        if self._requests.unanswered >= patience:
             self._go(State.SETTING, t_ns)
             return self._act(t_ns)
-        return self._request(t_ns)
+        return self._tell_news() + self._request(t_ns)
 
     def _request(self, t_ns: int) -> bytes:
         self._requests.asked(t_ns)

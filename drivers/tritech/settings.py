@@ -7,7 +7,7 @@ from typing import Final
 
 from config.schema import Sonar
 from drivers.tritech import units
-from drivers.tritech.commands import HeadCommand, HeadParameters
+from drivers.tritech.commands import Gains, HeadCommand, HeadParameters
 from drivers.tritech.headdata import USUAL_CONTROL, Control, HeadData
 
 HEAD_TYPES: Final = {"dst": 0x11, "non-dst": 0x02}
@@ -27,12 +27,13 @@ def head_command(sonar: Sonar) -> HeadCommand:
     that bit stays as Tritech's software sets it, and `bow_angle_rad` mirrors the angles, the sector's limits included.
     """
     interval, bins = units.sampling(sonar.range_m, sonar.bins, sonar.sound_speed_m_s)
+    control = USUAL_CONTROL if sonar.sector_deg else USUAL_CONTROL | Control.CONTINUOUS
     left, right = _limits(sonar)
     gain = units.gain_byte(sonar.gain_pct)
     old = sonar.head_type == "non-dst"
     return HeadCommand(
         HeadParameters(
-            control=USUAL_CONTROL if sonar.sector_deg else USUAL_CONTROL | Control.CONTINUOUS,
+            control=control | Control.CHANNEL_2 if sonar.channel == "high" else control,
             head_type=HEAD_TYPES[sonar.head_type],
             transmit_1=units.transmit_word(_LOW_HZ) if old else 0,
             transmit_2=units.transmit_word(_HIGH_HZ) if old else 0,
@@ -52,8 +53,15 @@ def head_command(sonar: Sonar) -> HeadCommand:
             step=units.step_units(sonar.step_deg),
             ad_interval=interval,
             bins=bins,
-        )
+        ),
+        gains=gains(sonar) if sonar.dual_channel else None,
     )
+
+
+def gains(sonar: Sonar) -> Gains:
+    """Gains of both channels as configured: they are alike, so that it does not matter which one the head uses."""
+    span, low, gain = units.level_byte(_AD_SPAN_DB), units.level_byte(_AD_LOW_DB), units.gain_byte(sonar.gain_pct)
+    return Gains(span, span, low, low, gain, gain, slope_1=_SLOPES[0], slope_2=_SLOPES[1])
 
 
 def bow_angle_rad(position: int, sonar: Sonar) -> float:

@@ -1,4 +1,4 @@
-"""An emulated Tritech DST imaging head: bytes of the host in, bytes of the head out, at the pace of its line.
+"""An emulated Tritech imaging head: bytes of the host in, bytes of the head out, at the pace of its line.
 
 Timing: a ping takes as long as sound needs to its last bin or its reply needs on the line, whichever is longer, plus
 some 10 ms for the motor; the head samples the next ping while it sends the last one's reply.
@@ -55,8 +55,9 @@ _MOST_BINS: Final = 1500
 _LEAST_INTERVAL: Final = 5
 _SERIAL: Final = 4711
 _CHIRP_HZ: Final = 650_000.0
-_ALWAYS: Final = Control.RAW | Control.HAS_MOTOR | Control.REPLY_ASL | Control.CHANNEL_2
+_ALWAYS: Final = Control.RAW | Control.HAS_MOTOR | Control.REPLY_ASL
 _OBEYED: Final = Control.ADC_8_ON | Control.CONTINUOUS | Control.INVERT
+_OLD_TYPE: Final = 0x02
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,9 +77,13 @@ Listen = Callable[[Sounding], NDArray[np.uint8]]
 
 @dataclass(frozen=True, slots=True)
 class HeadOptions:
-    """What differs from head to head; ``replies_per_request`` is 1 on half-duplex lines."""
+    """What differs from head to head; ``replies_per_request`` is 1 on half-duplex lines.
+
+    A head that is not ``dst`` has two channels and transmits with the frequencies that it is told.
+    """
 
     node: int = 2
+    dst: bool = True
     baud: int = 115200
     replies_per_request: int = 2
     centring_s: float = 4.0
@@ -155,9 +160,14 @@ class Head:
             case SendVersion():
                 self._say(t_ns, VersionData(0x31, 0x11, _SERIAL, 45074, 0x2AEB, self.options.node))
             case SendBBUser():
-                self._say(t_ns, user_block(serial=_SERIAL, half_duplex=self.options.replies_per_request == 1))
-                self._say(t_ns, FpgaCalData(bytes(66)))
-                self._say(t_ns, FpgaVersionData(bytes(14)))
+                self._say_block(t_ns)
+
+    def _say_block(self, t_ns: int) -> None:
+        dst, half_duplex = self.options.dst, self.options.replies_per_request == 1
+        self._say(t_ns, user_block(dst=dst, serial=_SERIAL, half_duplex=half_duplex))
+        if dst:
+            self._say(t_ns, FpgaCalData(bytes(66)))
+            self._say(t_ns, FpgaVersionData(bytes(14)))
 
     def _say(self, t_ns: int, message: Message) -> None:
         self._line.send(t_ns, encode(message, self.options.node))
@@ -191,7 +201,9 @@ class Head:
         gain_db = settings.gain_1 * 80.0 / 210.0
         sounding = Sounding(t_ns, units.angle_rad(beam.bearing), interval_ns, settings.bins, gain_db)
         control = _ALWAYS | settings.control & _OBEYED | (Control.SCAN_RIGHT if beam.clockwise else 0)
+        control |= Control.CHANNEL_2 if self.options.dst else settings.control & Control.CHANNEL_2
         data = _reply(settings, control, beam.bearing, beam.sweep, self._listen(sounding))
+        data = data if self.options.dst else _of_old_head(data, settings)
         frame = encode(data, self.options.node)
         self._answers.append((t_ns + settings.bins * interval_ns, frame))
         wire_ns = len(frame) * 10 * SECOND_NS // self.options.baud
@@ -227,7 +239,8 @@ def _with_gains(parameters: HeadParameters, gains: Gains) -> HeadParameters:
     span, low, gain, slope = gains.ad_span_1, gains.ad_low_1, gains.gain_1, gains.slope_1
     if parameters.control & Control.CHANNEL_2:
         span, low, gain, slope = gains.ad_span_2, gains.ad_low_2, gains.gain_2, gains.slope_2
-    return replace(parameters, ad_span=span, ad_low=low, gain_1=gain, slope_1=slope)
+    levels = replace(parameters, ad_span=span, ad_low=low, gain_1=gain)
+    return replace(levels, slope_2=slope) if parameters.control & Control.CHANNEL_2 else replace(levels, slope_1=slope)
 
 
 def _reply(settings: HeadParameters, control: Control, bearing: int, sweep: int, echoes: NDArray[np.uint8]) -> HeadData:
@@ -247,6 +260,13 @@ def _reply(settings: HeadParameters, control: Control, bearing: int, sweep: int,
         ad_span=settings.ad_span,
         ad_low=settings.ad_low,
     )
+
+
+def _of_old_head(data: HeadData, settings: HeadParameters) -> HeadData:
+    """Make it the reply of a head that is not DST: its type, and the frequency and slope of the channel in use."""
+    second = bool(settings.control & Control.CHANNEL_2)
+    word, slope = (settings.transmit_2, settings.slope_2) if second else (settings.transmit_1, settings.slope_1)
+    return replace(data, device_type=_OLD_TYPE, transmit_word=word, slope=slope)
 
 
 def _nibbles(settings: HeadParameters, echoes: NDArray[np.uint8]) -> bytes:
