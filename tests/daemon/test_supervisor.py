@@ -11,13 +11,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from rig import PATIENCE_S, Rig, configuration, free_ports
 
 from daemon.broker import Broker
 from daemon.pipeline import Pipeline
 from daemon.state import grid_digest, mesh_digest, poses_digest
 from drivers.log import read_header, read_log
 from drivers.records import Chunk, Event
+from tests.daemon.rig import PATIENCE_S, Rig, configuration, free_ports
 from tools.cli import main
 
 
