@@ -22,11 +22,11 @@ demo: .venv/.run                    ## an emulated dive with its live page; Ctrl
 
 test: .venv/.test                   ## every test but the slow ones
 	@sh .ci/packages $(BROWSER_PACKAGES) $(WINDOW_PACKAGES)
-	$(BIN)/python -m pytest -m "not slow" $(ARGS)
+	$(BIN)/python -m pytest -n 2 -m "not slow" $(ARGS)
 
 test-slow: .venv/.test              ## the slow tests
 	@sh .ci/packages $(BROWSER_PACKAGES) $(WINDOW_PACKAGES)
-	$(BIN)/python -m pytest -m slow $(ARGS)
+	$(BIN)/python -m pytest -n 2 -m slow $(ARGS)
 
 check: .venv/.check                 ## style, types, import rules
 	$(BIN)/ruff check .
