@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -226,22 +225,3 @@ def test_a_bell_is_wider_below() -> None:
     site = SITES["bell"]()
     upper, lower = (Scene(site, 1).power(View(0.0, 0.0, depth, 0.02, 300), 3.0) for depth in (1.0, 2.6))
     assert int(lower.argmax()) > int(upper.argmax()) + 20
-
-
-@pytest.mark.parametrize("name", sorted(SITES))
-def test_stops_of_every_site_lie_in_open_water_within_reach(name: str) -> None:
-    site = SITES[name]()
-    segments = Segments.of(site.walls)
-    around = np.radians(np.arange(0.0, 360.0, 5.0))
-    for stop, after in zip(site.stops, [*site.stops[1:], None], strict=True):
-        here = np.array([stop.x_m, stop.y_m])
-        ways = trace(segments, here, around, 0)[0].way_m
-        assert ways.min() > 0.3
-        assert ways.max() < 30.0, "walls all around"
-        assert 0.2 < stop.depth_m < site.floor_m - 0.2
-        if after is not None:
-            path = [here, *(np.array(point) for point in after.via_m), np.array([after.x_m, after.y_m])]
-            for a, b in pairwise(path):
-                length = float(np.hypot(*(b - a)))
-                assert length <= 3.0
-                assert cast(segments, a[None], ((b - a) / length)[None]).way_m[0] > length + 0.2

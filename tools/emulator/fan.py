@@ -44,7 +44,6 @@ class View:
 class Plan:
     """Walls and corners ``(k, 2)`` at a depth."""
 
-    depth_m: float
     segments: Segments
     corners_m: Floats
 
@@ -71,15 +70,15 @@ class Walls:
         self._site = site
         self._texture = Texture(seed, site.material.texture_db)
         self._level = 10.0 ** ((WALL_DB + site.material.backscatter_db) / 10.0)
-        self._plan: Plan | None = None
+        self._plans: dict[float, Plan] = {}
 
     def plan(self, depth_m: float) -> Plan:
         """Return walls and corners at a depth, to the centimetre; an upright site has one plan."""
         depth_m = round(depth_m, 2) if self._site.taper_per_m else self._site.plan_depth_m
-        if self._plan is None or self._plan.depth_m != depth_m:
+        if depth_m not in self._plans:
             walls = self._site.plan_at(depth_m)
-            self._plan = Plan(depth_m, Segments.of(walls), corners(walls))
-        return self._plan
+            self._plans[depth_m] = Plan(Segments.of(walls), corners(walls))
+        return self._plans[depth_m]
 
     def look(self, view: View, angle_rad: Floats, step_rad: float, bounces: int) -> Fan:
         """Send rays along compass angles, each ``step_rad`` wide, and spread what comes back over range."""
@@ -144,13 +143,14 @@ class Walls:
         return np.asarray((lobe + rough) * self._level, dtype=np.float64)
 
     def _height_loss(self, view: View, way_m: Floats, elevation_rad: Floats) -> Floats:
-        """Share left after the floor and the surface that a ray off the horizontal meets on its way."""
+        """Share left after the floor and the surface or ceiling that a ray off the horizontal meets on its way."""
         sink = np.minimum(way_m, 1e3)[:, None] * np.tan(elevation_rad)
-        height = self._site.floor_m
-        below, above = height - view.depth_m, view.depth_m
+        height = self._site.floor_m - self._site.ceiling_m
+        below, above = self._site.floor_m - view.depth_m, view.depth_m - self._site.ceiling_m
         hits = np.where(sink > 0, np.ceil((sink - below) / height), np.ceil((-sink - above) / height)).clip(0, 8)
-        first = np.where(sink > 0, _FLOOR_MIRROR, _SURFACE_MIRROR)
-        other = np.where(sink > 0, _SURFACE_MIRROR, _FLOOR_MIRROR)
+        upper = _FLOOR_MIRROR if self._site.is_flooded else _SURFACE_MIRROR
+        first = np.where(sink > 0, _FLOOR_MIRROR, upper)
+        other = np.where(sink > 0, upper, _FLOOR_MIRROR)
         return np.asarray(first ** np.ceil(hits / 2) * other ** np.floor(hits / 2), dtype=np.float64)
 
 

@@ -79,13 +79,15 @@ class Scene:
         return beam.spread(way - beam.PULSE_M / 2, way * 1.02 + beam.PULSE_M / 2, power, view.bin_m, view.bins)
 
     def _level_planes(self, view: View, way_m: Floats, weight: Floats) -> Floats:
-        """Echo of floor and surface: from the range where the beam's height first meets them, up to the walls."""
+        """Echo of floor and surface, or ceiling: from where the beam's height first meets them, up to the walls."""
+        site = self._site
+        upper_db = _FLOOR_DB if site.is_flooded else _SURFACE_DB
         ranges = (np.arange(view.bins) + 0.5) * view.bin_m
         order = np.argsort(way_m)
         left = np.concatenate([[0.0], np.cumsum(weight[order][::-1])])[::-1]
         whole = beam.vertical((ELEVATION_EDGES[1:] + ELEVATION_EDGES[:-1]) / 2) @ np.diff(ELEVATION_EDGES)
         total = np.zeros(view.bins)
-        for height_m, level in ((self._site.floor_m - view.depth_m, _FLOOR_DB), (view.depth_m, _SURFACE_DB)):
+        for height_m, level in ((site.floor_m - view.depth_m, _FLOOR_DB), (view.depth_m - site.ceiling_m, upper_db)):
             sine = np.minimum(max(height_m, 0.02) / ranges, 1.0)
             cosine = np.sqrt(1.0 - sine**2)
             open_share = left[np.searchsorted(way_m[order], ranges * cosine)]
