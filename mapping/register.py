@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapping.values import Pose
-from mapping.view import View
+from mapping.view import Field, View, to_map
 
 SIGMAS_M = (0.5, 0.4, 0.3, 0.24, 0.19, 0.15, 0.12, 0.1)
 """Widths of a wall, from the first step of the filter to the last."""
@@ -30,7 +30,11 @@ LEVER_M = 4.0
 WITNESSES = 40.0
 """Independent points in a full scan: neighbouring returns share their errors, and walls repeat."""
 POINTS_A_WITNESS = 2.5
+OVERLAP_POWER = 0.5
+FEW = 0.1
+"""Share of known points below which dividing by it stops."""
 ELSEWHERE_M = 0.6
+"""Poses nearer than this are the same answer."""
 EDGE_M = 0.3
 """Softness of the edge of the prior's disc."""
 
@@ -89,6 +93,7 @@ class Likelihood:
     def __init__(self, scan: View, reference: View, prior: Prior) -> None:
         self._scan, self._reference, self._prior = scan, reference, prior
         self._tables: dict[float, tuple[NDArray[np.float32], NDArray[np.float32]]] = {}
+        self._known = (reference.field.known(), scan.field.known())
         own, other = len(scan.points.xy_m), len(reference.points.xy_m)
         self.witnesses = min(WITNESSES, float(scan.points.trust.sum()) / POINTS_A_WITNESS)
         # A map has more walls than one scan can see; those it does not see are neutral and must not dilute the others.
@@ -99,28 +104,42 @@ class Likelihood:
         return self.witnesses * self.score(poses, sigma_m) + self._prior.log_density(poses)
 
     def score(self, poses: NDArray[np.float64], sigma_m: float) -> NDArray[np.float64]:
-        """Mean score of the points, both ways round, ``(n,)``."""
+        """Mean score of the points, both ways round, ``(n,)``.
+
+        Points that fall where nothing is known score nothing, so the sum draws scans to where they overlap most:
+        along a tunnel, to no motion at all.  Dividing by a power of the share that is known takes most of that away.
+        """
         if sigma_m not in self._tables:
             self._tables[sigma_m] = (self._reference.field.scores(sigma_m), self._scan.field.scores(sigma_m))
-        outward, inward = self._tables[sigma_m]
+        forth = self._cells(poses)
+        back = self._cells_back(poses)
+        own, other = self._scan.points.weight, self._share * self._reference.points.weight
+        total, known = (
+            0.5 * (outward.ravel().take(forth) @ own + inward.ravel().take(back) @ other)
+            for outward, inward in (self._tables[sigma_m], self._known)
+        )
+        return np.asarray(total / ((known + FEW) / (1.0 + FEW)) ** OVERLAP_POWER, dtype=np.float64)
+
+    def _cells(self, poses: NDArray[np.float64]) -> NDArray[np.int32]:
+        """Cells of the reference's field in which the scan's points fall, ``(n, points)``."""
         c, s = np.cos(poses[:, 2])[:, None], np.sin(poses[:, 2])[:, None]
-        own, other = self._scan.points, self._reference.points
-        x, y = own.xy_m[:, 0], own.xy_m[:, 1]
-        forth = _look(outward, self._reference, poses[:, :1] + c * x + s * y, poses[:, 1:2] - s * x + c * y)
-        dx, dy = other.xy_m[:, 0] - poses[:, :1], other.xy_m[:, 1] - poses[:, 1:2]
-        back = _look(inward, self._scan, c * dx - s * dy, s * dx + c * dy)
-        return np.asarray(0.5 * (forth @ own.weight + self._share * (back @ other.weight)), dtype=np.float64)
+        x, y = self._scan.points.xy_m[:, 0], self._scan.points.xy_m[:, 1]
+        return _cells(self._reference.field, poses[:, :1] + c * x + s * y, poses[:, 1:2] - s * x + c * y)
+
+    def _cells_back(self, poses: NDArray[np.float64]) -> NDArray[np.int32]:
+        """Cells of the scan's field in which the reference's points fall, ``(n, points)``."""
+        c, s = np.cos(poses[:, 2])[:, None], np.sin(poses[:, 2])[:, None]
+        dx = self._reference.points.xy_m[:, 0] - poses[:, :1]
+        dy = self._reference.points.xy_m[:, 1] - poses[:, 1:2]
+        return _cells(self._scan.field, c * dx - s * dy, s * dx + c * dy)
 
 
-def _look(
-    table: NDArray[np.float32], view: View, x_m: NDArray[np.float64], y_m: NDArray[np.float64]
-) -> NDArray[np.float32]:
-    """Look points up in a table of scores; beyond its border nothing is known."""
-    field = view.field
-    col = np.clip((x_m - field.x0_m) / field.cell_m, 0, table.shape[1] - 1).astype(np.int32)
-    row = np.clip((y_m - field.y0_m) / field.cell_m, 0, table.shape[0] - 1).astype(np.int32)
-    found: NDArray[np.float32] = table.ravel().take(row * table.shape[1] + col)
-    return found
+def _cells(field: Field, x_m: NDArray[np.float64], y_m: NDArray[np.float64]) -> NDArray[np.int32]:
+    """Flat indices of places in a field; beyond its border the border's own, where nothing is known."""
+    rows, cols = field.free.shape
+    col = np.clip((x_m - field.x0_m) / field.cell_m, 0, cols - 1).astype(np.int32)
+    row = np.clip((y_m - field.y0_m) / field.cell_m, 0, rows - 1).astype(np.int32)
+    return np.asarray(row * np.int32(cols) + col, dtype=np.int32)
 
 
 def register(scan: View, reference: View, prior: Prior, particles: int, rng: np.random.Generator) -> Match:
@@ -204,11 +223,9 @@ def overlap(scan: View, reference: View, pose: NDArray[np.float64]) -> float:
 
 
 def _near(scan: View, reference: View, pose: NDArray[np.float64]) -> NDArray[np.float64]:
-    c, s = math.cos(pose[2]), math.sin(pose[2])
-    x, y = scan.points.xy_m[:, 0], scan.points.xy_m[:, 1]
-    distance_m = reference.field.distance_m.astype(np.float32)
-    distance = _look(distance_m, reference, pose[0] + c * x + s * y, pose[1] - s * x + c * y)
-    return np.asarray(distance < 2.0 * SIGMA_M, dtype=np.float64)
+    xy = to_map(_pose(pose), scan.points.xy_m)
+    distance_m = reference.field.distance_m.ravel().take(_cells(reference.field, xy[:, 0], xy[:, 1]))
+    return np.asarray(distance_m < 2.0 * SIGMA_M, dtype=np.float64)
 
 
 def weakest_direction(scan: View, reference: View, pose: NDArray[np.float64]) -> tuple[float, float]:

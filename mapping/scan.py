@@ -8,7 +8,6 @@ same speckle again, and seeing it twice proves nothing.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -16,13 +15,23 @@ from numpy.typing import NDArray
 
 from config.schema import Map
 from drivers.readings import Altitude, Depth, Heading, Ping, Reading
-from mapping.compass import Track, wrap
-from mapping.rest import SECTOR_BEAMS, Agreement, compare, profile, still
+from mapping.compass import Track
+from mapping.rest import SECTOR_BEAMS, Agreement, common_to_all, compare, profile, still
+from mapping.turns import (
+    TURN,
+    Beam,
+    longest_leg,
+    next_beam,
+    partner,
+    same_settings,
+    steady_headings,
+    step_of,
+    swept_rad,
+)
 from mapping.values import Scan
 
 HOLD_NS = 1_000_000_000
 """A ping waits this long for a heading at or after it."""
-TURN = 2.0 * math.pi
 CONFIRM_RAD = math.radians(120.0)
 """A circle is believed when this much of the next turn agrees with it: who drives along a wall sees that one wall
 unchanged, but hardly over more than this."""
@@ -37,26 +46,19 @@ SWEEP_SHARE = 0.75
 """Share of a sector sweep that the sweep back must confirm."""
 PARTIAL_RAD = math.radians(60.0)
 """Arcs smaller than this are no scan."""
-UNSTEADY_PINGS = 5
-"""Consecutive beams that disagree: the vehicle moved."""
+UNSTEADY_PINGS = 10
+"""Consecutive beams that disagree: the vehicle moves."""
+LEFT_OF, LEFT_SHARE = 100, 0.5
+"""A rest is over when so many of the last beams disagree: after a move, those of a whole turn do."""
 RACE_RAD_S = math.radians(8.0)
 DEPTH_STEP_M = 0.4
+COMMON_PINGS, COMMON_OF = 16, 256
+"""What is common to all bearings is found anew every so many pings, from so many."""
 KEEP_TURNS = 2.2
 MAX_PINGS = 8192
 """Bound of the buffer when the head does not turn."""
 
 Quality = Literal["full", "partial", "moving"]
-
-
-@dataclass(frozen=True, slots=True)
-class _Beam:
-    """A ping with the heading of its moment; ``turn_rad`` is its direction, unwrapped along the head's rotation."""
-
-    ping: Ping
-    heading_rad: float
-    turn_rad: float
-    leg: int
-    profile: NDArray[np.float64]
 
 
 class ScanBuilder:
@@ -92,9 +94,12 @@ class ScanBuilder:
         return scans
 
     def _restart(self) -> None:
-        self._beams: list[_Beam] = []
+        self._beams: list[Beam] = []
         self._recent: list[Agreement] = []
         self._run: list[tuple[int, int]] = []  # steady beams and their partners, as indices into _beams
+        self._common_profile = np.zeros(0)
+        self._common_age = 0
+        self._verdicts: list[bool] = []
         self._unsteady = 0
         self._resting = False
         self._moved = False
@@ -111,98 +116,92 @@ class ScanBuilder:
 
     def _take(self, ping: Ping) -> list[Scan]:
         scans: list[Scan] = []
-        if self._beams and not _same_settings(self._beams[-1].ping, ping):
+        if self._beams and not same_settings(self._beams[-1].ping, ping):
             scans = self._close()
             self._restart()
-        self._beams.append(self._beam(ping))
-        partner = self._partner()
-        if partner is not None:
-            scans += self._judge(partner)
+        shape = profile(ping.echoes, ping.bin_m, self._config.min_range_m)
+        self._beams.append(next_beam(self._beams, ping, self._heading(ping.t_ns), shape))
+        earlier = partner(self._beams)
+        if earlier is not None:
+            scans += self._judge(earlier)
         self._trim()
         return scans
-
-    def _beam(self, ping: Ping) -> _Beam:
-        heading = self._heading(ping.t_ns)
-        direction = heading + ping.bearing_rad
-        shape = profile(ping.echoes, ping.bin_m, self._config.min_range_m)
-        if not self._beams:
-            return _Beam(ping, heading, direction, 0, shape)
-        last = self._beams[-1]
-        step = wrap(ping.bearing_rad - last.ping.bearing_rad)
-        turn = last.turn_rad + step + wrap(heading - last.heading_rad)
-        return _Beam(ping, heading, turn, last.leg + int(self._reverses(step)), shape)
-
-    def _reverses(self, step_rad: float) -> bool:
-        """Whether the head turns round; a bearing that is told twice at a limit does not."""
-        for later, earlier in zip(reversed(self._beams[1:]), reversed(self._beams[:-1]), strict=True):
-            before = wrap(later.ping.bearing_rad - earlier.ping.bearing_rad)
-            if before:
-                return step_rad * before < 0.0
-        return False
 
     def _heading(self, t_ns: int) -> float:
         if len(self._headings):
             return self._headings.at(t_ns)
         return math.radians(self._config.heading_deg or 0.0)
 
-    def _partner(self) -> int | None:
-        """Index of the beam that looked the same way a turn before, or in the sweep before."""
-        last = self._beams[-1]
-        turns = np.array([b.turn_rad for b in self._beams[:-1]])
-        legs = np.array([b.leg for b in self._beams[:-1]])
-        away = np.where(legs == last.leg, np.abs(np.abs(turns - last.turn_rad) - TURN), np.inf)
-        away = np.where(legs == last.leg - 1, np.abs(turns - last.turn_rad), away)
-        if not len(away) or away.min() > 0.75 * last.ping.head.step_rad:
-            return None
-        return int(np.argmin(away))
-
-    def _judge(self, partner: int) -> list[Scan]:
-        now, before = self._beams[-1], self._beams[partner]
-        self._recent.append(compare(now.profile, before.profile, now.ping.bin_m))
-        del self._recent[:-SECTOR_BEAMS]
-        verdict = still(self._recent)
+    def _judge(self, earlier: int) -> list[Scan]:
+        now, before = self._beams[-1], self._beams[earlier]
+        self._recent.append(compare(now.profile, before.profile, self._common(), now.ping.bin_m))
+        del self._recent[:-COMMON_OF]
+        verdict = still(self._recent[-SECTOR_BEAMS:], float(np.median([a.energy for a in self._recent])))
         if self._races(now, before):
             verdict = False
-        if verdict is False:
-            return self._disagree()
-        if verdict:
-            self._unsteady = 0
-        self._run.append((len(self._beams) - 1, partner))
-        if self._resting or self._agreed_rad() < self._needed_rad() or self._swing_rad() > STEADY_RAD:
+        if verdict is None:
             return []
-        return self._emit(0.8)
+        self._verdicts.append(verdict)
+        del self._verdicts[:-LEFT_OF]
+        if self._resting:
+            self._watch()
+            return []
+        return self._agree(earlier) if verdict else self._disagree()
 
-    def _races(self, now: _Beam, before: _Beam) -> bool:
-        if abs(self._headings.rate(now.ping.t_ns)) > RACE_RAD_S:
-            return True
-        if len(self._depths) == 0:
-            return False
-        return abs(self._depths.at(now.ping.t_ns) - self._depths.at(before.ping.t_ns)) > DEPTH_STEP_M
+    def _watch(self) -> None:
+        """Watch for the end of a rest whose scan was given."""
+        if self._verdicts.count(False) >= LEFT_SHARE * LEFT_OF:
+            self._resting, self._moved, self._unsteady = False, True, 0
+            self._run.clear()
+
+    def _agree(self, earlier: int) -> list[Scan]:
+        self._unsteady = 0
+        self._run.append((len(self._beams) - 1, earlier))
+        heading = self._beams[-1].heading_rad
+        while abs(self._beams[self._run[0][1]].heading_rad - heading) > STEADY_RAD:
+            del self._run[0]
+        if self._agreed_rad() < self._needed_rad() or self._swing_rad() > STEADY_RAD:
+            return []
+        return self._emit(1.0)
 
     def _disagree(self) -> list[Scan]:
         self._unsteady += 1
         if self._unsteady < UNSTEADY_PINGS:
             return []
         scans = self._emit(0.5) if self._confirmed_late(CONFIRM_LEFT_RAD) else []
-        self._resting = False
         self._moved = True
         self._run.clear()
         return scans
+
+    def _common(self) -> NDArray[np.float64]:
+        """Give what all bearings of the last turn show, renewed now and then."""
+        if self._common_age % COMMON_PINGS == 0:
+            self._common_profile = common_to_all([b.profile for b in self._beams[-COMMON_OF:]])
+        self._common_age += 1
+        return self._common_profile
+
+    def _races(self, now: Beam, before: Beam) -> bool:
+        """Whether heading or depth alone tell a move."""
+        turned = abs(now.heading_rad - before.heading_rad) > STEADY_RAD
+        if turned or abs(self._headings.rate(now.ping.t_ns)) > RACE_RAD_S:
+            return True
+        if len(self._depths) == 0:
+            return False
+        return abs(self._depths.at(now.ping.t_ns) - self._depths.at(before.ping.t_ns)) > DEPTH_STEP_M
+
+    def _confirmed_late(self, needed_rad: float) -> bool:
+        enough = self._agreed_rad() >= needed_rad and self._swing_rad() <= STEADY_LATE_RAD
+        return enough and not self._resting and not self._sweeping()
 
     def _agreed_rad(self) -> float:
         if not self._run:
             return 0.0
         return abs(self._beams[self._run[-1][0]].turn_rad - self._beams[self._run[0][0]].turn_rad)
 
-    def _confirmed_late(self, needed_rad: float) -> bool:
-        enough = self._agreed_rad() >= needed_rad and self._swing_rad() <= STEADY_LATE_RAD
-        return enough and not self._resting and not self._sweeping()
-
     def _swing_rad(self) -> float:
         """Range of the heading over the circle and the beams that confirm it."""
         beams = self._beams[self._run[0][1] : self._run[-1][0] + 1]
-        t_ns = np.array([b.ping.t_ns for b in beams], dtype=np.int64)
-        return float(np.ptp(_smooth(t_ns, np.array([b.heading_rad for b in beams]))))
+        return float(np.ptp(steady_headings(beams)))
 
     def _sweeping(self) -> bool:
         return self._beams[-1].leg != self._beams[0].leg
@@ -210,11 +209,7 @@ class ScanBuilder:
     def _needed_rad(self) -> float:
         if not self._sweeping():
             return CONFIRM_RAD
-        return max(CONFIRM_RAD, SWEEP_SHARE * self._sweep_rad(self._beams[self._run[-1][1]].leg))
-
-    def _sweep_rad(self, leg: int) -> float:
-        turns = [b.turn_rad for b in self._beams if b.leg == leg]
-        return max(turns) - min(turns) if turns else 0.0
+        return max(CONFIRM_RAD, SWEEP_SHARE * swept_rad(self._beams, self._beams[self._run[-1][1]].leg))
 
     def _emit(self, settled: float) -> list[Scan]:
         """Give a circle of those that agree, or the sweep that was confirmed.
@@ -222,12 +217,13 @@ class ScanBuilder:
         ``settled`` chooses the circle, 0 the first, 1 the last: the first ones may hold the end of the drift in, the
         last ones the beginning of the way out.
         """
-        first, partner = self._run[int(settled * (len(self._run) - 1))]
+        first, earlier = self._run[int(settled * (len(self._run) - 1))]
+        self._verdicts.clear()
         leg = self._beams[self._run[-1][1]].leg
         self._resting = True
         if self._sweeping():
             return self._scan([b for b in self._beams if b.leg == leg], "partial")
-        return self._scan(self._beams[partner:first], "full")
+        return self._scan(self._beams[earlier:first], "full")
 
     def _close(self) -> list[Scan]:
         """Give what the buffer holds at the end of a log or of a setting."""
@@ -235,31 +231,28 @@ class ScanBuilder:
             return self._emit(0.5)
         if self._resting or self._moved or not self._beams:
             return []
-        leg = max({b.leg for b in self._beams}, key=self._sweep_rad)
-        beams = [b for b in self._beams if b.leg == leg]
-        turned = [i for i, b in enumerate(beams) if abs(b.turn_rad - beams[0].turn_rad) >= TURN - 0.5 * _step(beams)]
-        beams = beams[: turned[0]] if turned else beams
-        whole = abs(beams[-1].turn_rad - beams[0].turn_rad) >= TURN - 1.5 * _step(beams)
+        beams = longest_leg(self._beams)
+        whole = abs(beams[-1].turn_rad - beams[0].turn_rad) >= TURN - 1.5 * step_of(beams)
         return self._scan(beams, "full" if whole else "partial")
 
-    def _scan(self, beams: list[_Beam], quality: Quality) -> list[Scan]:
+    def _scan(self, beams: list[Beam], quality: Quality) -> list[Scan]:
         if not beams or abs(beams[-1].turn_rad - beams[0].turn_rad) < PARTIAL_RAD:
             return []
-        t_ns = np.array([b.ping.t_ns for b in beams], dtype=np.int64)
-        heading = _smooth(t_ns, np.array([b.heading_rad for b in beams]))
+        start_ns, end_ns = beams[0].ping.t_ns, beams[-1].ping.t_ns
+        heading = steady_headings(beams)
         reference = float(heading.mean())
-        depths = self._depths.within(int(t_ns[0]), int(t_ns[-1]))
-        depth = self._depths.at(int(t_ns[-1])) if len(self._depths) else math.nan
+        depths = self._depths.within(start_ns, end_ns)
+        depth = self._depths.at(end_ns) if len(self._depths) else math.nan
         scan = Scan(
             index=self._count,
-            t_start_ns=int(t_ns[0]),
-            t_end_ns=int(t_ns[-1]),
+            t_start_ns=start_ns,
+            t_end_ns=end_ns,
             heading_rad=reference % TURN,
             depth_m=float(np.median(depths)) if len(depths) else depth,
             bearing_rad=np.array([b.ping.bearing_rad for b in beams]) + heading - reference,
             echoes=np.stack([b.ping.echoes for b in beams]),
             bin_m=beams[0].ping.bin_m,
-            step_rad=_step(beams),
+            step_rad=step_of(beams),
             quality=quality,
         )
         self._count += 1
@@ -275,22 +268,3 @@ class ScanBuilder:
             return
         del self._beams[:first]
         self._run = [(i - first, j - first) for i, j in self._run if j >= first]
-
-
-def _same_settings(a: Ping, b: Ping) -> bool:
-    return (a.bin_m, len(a.echoes), a.head.step_rad) == (b.bin_m, len(b.echoes), b.head.step_rad)
-
-
-def _step(beams: list[_Beam]) -> float:
-    """Angle between neighbouring beams: what they were, else what the head was told."""
-    moved = np.abs(np.diff([b.turn_rad for b in beams]))
-    moved = moved[moved > 1e-6]
-    return float(np.median(moved)) if len(moved) else beams[0].ping.head.step_rad
-
-
-def _smooth(t_ns: NDArray[np.int64], heading_rad: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Average the heading over half a second to either side: a compass trembles more than a vehicle at rest."""
-    total = np.concatenate(([0.0], np.cumsum(heading_rad)))
-    first = np.searchsorted(t_ns, t_ns - 500_000_000, side="left")
-    last = np.searchsorted(t_ns, t_ns + 500_000_000, side="right")
-    return np.asarray((total[last] - total[first]) / (last - first), dtype=np.float64)

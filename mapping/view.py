@@ -26,6 +26,7 @@ TRUSTED_SD_M = 0.08
 """Returns with a larger standard deviation count less."""
 WALL_LOG_ODDS = 0.4
 """Cells above this are walls to registration: it may use vague ones too."""
+KNOWN_M = 0.3
 PAD_M = 0.6
 """Unknown border around a field."""
 
@@ -55,6 +56,10 @@ class Field:
         near = np.exp(-0.5 * (self.distance_m / sigma_m) ** 2)
         odds = near + np.where(self.free, HIT_FREE, HIT_UNKNOWN)
         return np.log(odds / HIT_UNKNOWN).astype(np.float32)
+
+    def known(self) -> NDArray[np.float32]:
+        """1 where a point would be judged, in free water or at a wall, else 0, ``(rows, cols)``."""
+        return (self.free | (self.distance_m < KNOWN_M)).astype(np.float32)
 
 
 @dataclass(frozen=True, slots=True)
