@@ -1,4 +1,4 @@
-"""Serial ports: devices, pseudo-terminals and serial servers behind one face.
+"""Serial ports: devices, pseudo-terminals, serial servers and datagrams behind one face.
 
 One of the two places below the daemon that may open things; it neither threads nor waits, but for at most
 `_WRITE_S` when a line takes no bytes.
@@ -9,9 +9,11 @@ from __future__ import annotations
 import contextlib
 import errno
 import io
+import socket
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Final, Protocol
+from urllib.parse import urlsplit
 
 import serial
 from serial.tools.list_ports import comports
@@ -23,10 +25,62 @@ _WRITE_S: Final = 0.2
 _BY_ID: Final = Path("/dev/serial/by-id")
 
 
+class _Stream(Protocol):
+    """What pyserial and `_Datagrams` have in common."""
+
+    def read(self, size: int, /) -> bytes: ...
+
+    def write(self, data: bytes, /) -> int | None: ...
+
+    def fileno(self) -> int: ...
+
+    def close(self) -> None: ...
+
+
+class _Datagrams:
+    """Datagrams sent to an address of this machine, one after the other as a stream; nothing is ever sent back.
+
+    ``udp://:14550`` hears this machine alone.  ``udp://192.168.2.1:14550`` hears whoever reaches that address, and
+    ``udp://0.0.0.0:10110`` broadcasts too: that is for the operator to say.
+    """
+
+    def __init__(self, url: str) -> None:
+        address = urlsplit(url)
+        if address.port is None:
+            raise ValueError("no port number, as in udp://:14550")
+        family, kind, _, _, place = socket.getaddrinfo(
+            address.hostname or "127.0.0.1", address.port, type=socket.SOCK_DGRAM
+        )[0]
+        self._socket = socket.socket(family, kind)
+        self._socket.setblocking(False)
+        try:
+            self._socket.bind(place)
+        except OSError:
+            self._socket.close()
+            raise
+
+    def read(self, size: int) -> bytes:
+        data = bytearray()
+        with contextlib.suppress(BlockingIOError):
+            while len(data) < size:
+                data += self._socket.recv(_BLOCK)
+        return bytes(data)
+
+    def write(self, data: bytes) -> int | None:
+        raise OSError(errno.EOPNOTSUPP, f"datagrams are only listened to; {len(data)} bytes were not sent")
+
+    def fileno(self) -> int:
+        return self._socket.fileno()
+
+    def close(self) -> None:
+        self._socket.close()
+
+
 class Port:
     """An open port, for one program alone where the system can say so.
 
-    ``url`` is anything that pyserial opens: a device, ``socket://host:port``, ``rfc2217://host:port``, ``loop://``.
+    ``url`` is anything that pyserial opens: a device, ``socket://host:port``, ``rfc2217://host:port``, ``loop://``;
+    or ``udp://address:port`` to listen at (without address: to this machine alone).
     Every method raises PortError when the port is lost; open it again then.
     """
 
@@ -34,25 +88,21 @@ class Port:
         """Open the port; raise PortError with what to do where it is absent, busy, forbidden or no port."""
         self.url = url
         try:
-            self._serial = serial.serial_for_url(url, do_not_open=True, timeout=0, write_timeout=_WRITE_S)
-            self._serial.baudrate = baud
-            if _is_device(url):
-                self._serial.exclusive = True
-            self._serial.open()
+            self._stream = _Datagrams(url) if url.startswith("udp://") else _open(url, baud)
         except (OSError, ValueError, OverflowError) as error:
             raise PortError(_why_not_open(url, baud, error)) from None
 
     def read(self) -> bytes:
         """Return what has come, perhaps nothing, without waiting."""
         try:
-            return bytes(self._serial.read(_BLOCK))
+            return bytes(self._stream.read(_BLOCK))
         except (OSError, TypeError) as error:
             raise PortError(f"{self.url} was lost: {_line(error)}; check plug and cable") from None
 
     def write(self, data: bytes) -> None:
         """Send ``data`` whole."""
         try:
-            self._serial.write(data)
+            self._stream.write(data)
         except serial.SerialTimeoutException:
             raise PortError(f"{self.url} takes no bytes; check the cable and the device's handshake") from None
         except (OSError, TypeError) as error:
@@ -61,14 +111,24 @@ class Port:
     def fileno(self) -> int | None:
         """Return what to wait on, or None for a port that has no such thing (``loop://``)."""
         try:
-            return int(self._serial.fileno())
+            return int(self._stream.fileno())
         except (io.UnsupportedOperation, AttributeError):
             return None
 
     def close(self) -> None:
         """Close the port; closing it again does nothing."""
         with contextlib.suppress(OSError):
-            self._serial.close()
+            self._stream.close()
+
+
+def _open(url: str, baud: int) -> _Stream:
+    opened = serial.serial_for_url(url, do_not_open=True, timeout=0, write_timeout=_WRITE_S)
+    opened.baudrate = baud
+    if _is_device(url):
+        opened.exclusive = True
+    opened.open()
+    stream: _Stream = opened
+    return stream
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,6 +168,8 @@ def _is_device(url: str) -> bool:
 
 def _why_not_open(url: str, baud: int, error: Exception) -> str:
     number = error.errno if isinstance(error, OSError) else None
+    if url.startswith("udp://"):
+        return _why_not_listen(url, number, error)
     if number in (errno.ENOENT, errno.ENXIO, errno.ENODEV):
         return f"{url} is not there; plug it in, or choose one that `lacuna ports` lists"
     if number in (errno.EAGAIN, errno.EBUSY):
@@ -121,6 +183,14 @@ def _why_not_open(url: str, baud: int, error: Exception) -> str:
     if _is_device(url):
         return f"{url} cannot be opened: {_line(error)}; see `lacuna ports`"
     return f"{url} cannot be opened: {_line(error)}; check the address and that the other end is on"
+
+
+def _why_not_listen(url: str, number: int | None, error: Exception) -> str:
+    if number == errno.EADDRINUSE:
+        return f"{url} is in use; stop the other program, or have a second stream sent to another port"
+    if number == errno.EADDRNOTAVAIL:
+        return f"{url} is no address of this machine; name one that `ip address` lists, or none for this machine alone"
+    return f"{url} cannot be listened at: {_line(error)}; write udp://:PORT or udp://ADDRESS:PORT"
 
 
 def _group(url: str) -> str:

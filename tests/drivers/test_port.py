@@ -99,6 +99,9 @@ def plain_file(folder: Path) -> str:
         (lambda _: "socket://127.0.0.1:1", "cannot be opened: .*; check the address"),
         (lambda _: "socket://", "cannot be opened: .*; check the address"),
         (lambda _: "", "is not there"),
+        (lambda _: "udp://192.0.2.1:14550", "is no address of this machine"),
+        (lambda _: "udp://:99999", "cannot be listened at: .*; write udp://:PORT"),
+        (lambda _: "udp://:", "cannot be listened at: .*; write udp://:PORT"),
     ],
 )
 def test_what_cannot_be_opened(url: Callable[[Path], str], message: str, tmp_path: Path) -> None:
@@ -132,6 +135,27 @@ def test_serial_server() -> None:
         with pytest.raises(PortError, match="was lost"):
             read_until(port, 1)
         port.close()
+
+
+def test_datagrams_become_one_stream() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as peer:
+        peer.bind(("127.0.0.1", 0))
+        free = peer.getsockname()[1]
+    port = Port(f"udp://:{free}", 4800)
+    assert port.read() == b""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as peer:
+        for piece in (b"$HCHDM,1", b"", b"23.4,M*2D\r\n"):
+            peer.sendto(piece, ("127.0.0.1", free))
+    assert read_until(port, 19) == b"$HCHDM,123.4,M*2D\r\n"
+    assert (port.fileno() or -1) > 0
+    with pytest.raises(PortError, match="only listened to"):
+        port.write(b"x")
+    with pytest.raises(PortError, match="is in use; stop the other program"):
+        Port(f"udp://127.0.0.1:{free}", 4800)
+    port.close()
+    with pytest.raises(PortError, match="was lost"):
+        port.read()
+    Port(f"udp://localhost:{free}", 4800).close()
 
 
 def test_loop() -> None:
