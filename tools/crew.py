@@ -44,11 +44,12 @@ class Crew:
             if process is not None:
                 _end(process)
 
-    def start(self, seed: int, stations: int | None, truth: Path | None) -> None:
-        """Start the vehicle, and when its ports are there the daemon; raise LacunaError where one does not start."""
-        words = ["emulate", "--json", "--folder", str(self._scratch / "ports"), "--site", self._site]
-        words += ["--seed", str(seed), "--speed", str(self._speed)]
-        words += [] if stations is None else ["--stations", str(stations)]
+    def start(self, dive: list[str], truth: Path | None) -> None:
+        """Start the vehicle, and when its ports are there the daemon; raise LacunaError where one does not start.
+
+        ``dive`` are the words that tell `lacuna emulate` where and how to dive.
+        """
+        words = ["emulate", "--json", "--folder", str(self._scratch / "ports"), "--speed", str(self._speed), *dive]
         words += [] if truth is None else ["--truth", str(truth)]
         self._emulation = _started(words)
         if next(self._emulation_events(), {}).get("event") != "ready":

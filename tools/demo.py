@@ -16,8 +16,8 @@ from config.errors import LacunaError, UsageError
 from drivers.log import log_files
 from drivers.records import Json
 from tools.crew import Crew
+from tools.emulator import options
 from tools.emulator.serve import SPEEDS
-from tools.emulator.site import SITES
 from tools.files import make_folder, replace_file
 from tools.replay import config_of, replay, summary, write_results
 
@@ -26,10 +26,8 @@ _DIGESTS: Final = ("poses", "grid", "mesh")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's options."""
-    parser.add_argument("--site", choices=sorted(SITES), default="keyhole", help="where to dive (default: keyhole)")
+    options.add_arguments(parser)
     parser.add_argument("--speed", type=float, metavar="N", help="times real time (default: 4, headless 8)")
-    parser.add_argument("--stations", type=int, metavar="K", help="rest at the first K stops only")
-    parser.add_argument("--seed", type=int, default=1, help="of speckle, noise and drift (default: 1)")
     parser.add_argument("--headless", action="store_true", help="no dashboard: dive, map, write the results, end")
     parser.add_argument("-o", "--out", type=Path, metavar="DIR", help="folder of the log and the results")
     parser.add_argument("--json", action="store_true", help="print the report as JSON (headless)")
@@ -42,8 +40,7 @@ def run(args: argparse.Namespace) -> int:
     speed = args.speed if args.speed is not None else (8.0 if args.headless else 4.0)
     if not SPEEDS[0] <= speed <= SPEEDS[1] or not math.isfinite(speed):
         raise UsageError(f"--speed must be from {SPEEDS[0]:g} to {SPEEDS[1]:g}")
-    if args.seed < 0 or (args.stations is not None and args.stations < 1):
-        raise UsageError("--seed must not be negative, --stations 1 or more")
+    options.dive_options(args)  # refuses here, on one line, what the emulated vehicle would refuse
     with ExitStack() as stack:
         # Whoever ends the demo with SIGTERM means what Ctrl-C means: the other processes end with it.
         stack.callback(signal.signal, signal.SIGTERM, signal.signal(signal.SIGTERM, signal.default_int_handler))
@@ -51,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
         folder = args.out.resolve() if args.out else scratch / "logs"
         make_folder(folder)
         crew = stack.enter_context(Crew(scratch, folder, args.site, speed))
-        crew.start(args.seed, args.stations, folder / "truth.json" if args.headless else None)
+        crew.start(options.words(args), folder / "truth.json" if args.headless else None)
         return _headless(crew, folder, args.json) if args.headless else _watched(crew, bool(args.out))
 
 

@@ -14,6 +14,7 @@ from types import FrameType
 
 from config.errors import LogError, UsageError
 from drivers.records import Json
+from tools.emulator import options
 from tools.emulator.dive import Dive, DiveOptions
 from tools.emulator.record import record, write_jsonl
 from tools.emulator.serve import SPEEDS, Emulation
@@ -23,10 +24,8 @@ from tools.emulator.truth import truth_of
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
-    parser.add_argument("--site", choices=sorted(SITES), default="keyhole", help="where to dive (default: keyhole)")
-    parser.add_argument("--seed", type=int, default=1, help="of speckle, noise and drift (default: 1)")
+    options.add_arguments(parser)
     parser.add_argument("--speed", type=float, default=1.0, metavar="N", help="times real time (default: 1)")
-    parser.add_argument("--stations", type=int, metavar="K", help="rest at the first K stops only")
     parser.add_argument("--folder", type=Path, metavar="DIR", help="where the ports' names go (default: a new folder)")
     parser.add_argument("--truth", type=Path, metavar="FILE", help="write where everything truly was (JSON)")
     parser.add_argument("--record", type=Path, metavar="FILE", help="record a dive in simulated time as JSON lines")
@@ -35,17 +34,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serve until Ctrl-C or SIGTERM, or record."""
-    if args.stations is not None and args.stations < 1:
-        raise UsageError("--stations must be 1 or more")
-    if args.seed < 0:
-        raise UsageError("--seed must not be negative")
     if not SPEEDS[0] <= args.speed <= SPEEDS[1]:
         raise UsageError(f"--speed must be from {SPEEDS[0]:g} to {SPEEDS[1]:g}")
-    return _record(args) if args.record else _serve(args)
+    chosen = options.dive_options(args)
+    return _record(args, chosen) if args.record else _serve(args, chosen)
 
 
-def _record(args: argparse.Namespace) -> int:
-    dive = Dive(SITES[args.site](), args.seed, DiveOptions(stations=args.stations))
+def _record(args: argparse.Namespace, chosen: DiveOptions) -> int:
+    dive = Dive(SITES[args.site](), args.seed, chosen)
     count = write_jsonl(record(dive), args.record)
     if args.truth:
         _write_truth(truth_of(dive), args.truth)
@@ -54,10 +50,9 @@ def _record(args: argparse.Namespace) -> int:
     return 0
 
 
-def _serve(args: argparse.Namespace) -> int:
+def _serve(args: argparse.Namespace, chosen: DiveOptions) -> int:
     with _folder(args.folder) as folder, _stop_signals() as asked:
-        options = DiveOptions(stations=args.stations)
-        emulation = Emulation(folder, args.site, args.seed, args.speed, options, _tell_json if args.json else _tell)
+        emulation = Emulation(folder, args.site, args.seed, args.speed, chosen, _tell_json if args.json else _tell)
         try:
             emulation.serve(lambda: asked.stop)
         finally:

@@ -29,7 +29,7 @@ def test_a_headless_dive_leaves_log_and_results(tmp_path: Path, capsys: pytest.C
         (["--headless"], "needs --out DIR"),
         (["--speed", "0"], "--speed must be from"),
         (["--speed", "nan"], "--speed must be from"),
-        (["--stations", "0"], "--stations 1 or more"),
+        (["--stations", "0"], "--stations must be 1 or more"),
         (["--site", "atlantis"], "invalid choice"),
     ],
 )

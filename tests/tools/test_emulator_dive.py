@@ -138,7 +138,7 @@ def test_mounting_of_the_head_is_undone_by_the_configuration() -> None:
 
 def test_vehicle_moves_smoothly_along_its_path() -> None:
     stops = (Stop(0.0, 0.0, 1.0, 6.2), Stop(2.0, 2.0, 1.5, 0.2, via_m=((2.0, 0.0),)))
-    vehicle = Vehicle(stops, replace(SHORT, rest_pings=5, drift_m=0.0, wobble_rad=0.0))
+    vehicle = Vehicle(stops, replace(SHORT, rest_pings=5, sway_m=0.0, wobble_rad=0.0))
     vehicle.start(0)
     assert not vehicle.advance(S, 4, 0.0)
     assert not vehicle.advance(2 * S, 5, 0.0)

@@ -14,7 +14,7 @@ from tools.emulator.echoes import EchoModel, Place, Sampling
 from tools.emulator.feeds import FeedOptions, NmeaFeed
 from tools.emulator.head import Head, HeadOptions, Sounding
 from tools.emulator.site import Site
-from tools.emulator.vehicle import Vehicle, VehicleOptions
+from tools.emulator.vehicle import Rest, Vehicle, VehicleOptions
 
 SECOND_NS: Final = 1_000_000_000
 TRACK_NS: Final = 100_000_000
@@ -68,6 +68,18 @@ class Dive:
     def done(self) -> bool:
         """Whether the last stop's rest was long enough."""
         return self.vehicle.done
+
+    def place_during(self, rest: Rest) -> Place:
+        """Return where the vehicle truly was at a rest, on average; the stop itself where nothing is known yet."""
+        until_ns = rest.to_ns if rest.to_ns is not None else rest.from_ns
+        places = [each.place for each in self.track if rest.from_ns <= each.t_ns <= until_ns]
+        if not places:
+            return Place(rest.stop.x_m, rest.stop.y_m, rest.stop.depth_m, rest.stop.heading_rad)
+        rows = np.array([(each.x_m, each.y_m, each.depth_m) for each in places])
+        headings = np.array([each.heading_rad for each in places])
+        heading_rad = float(np.arctan2(np.sin(headings).mean(), np.cos(headings).mean()) % tau)
+        x_m, y_m, depth_m = (float(column) for column in rows.mean(axis=0))
+        return Place(x_m, y_m, depth_m, heading_rad)
 
     def push(self, t_ns: int, data: bytes) -> None:
         """Take bytes that the host sent to the sonar."""

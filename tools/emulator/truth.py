@@ -14,7 +14,8 @@ def truth_of(dive: Dive) -> dict[str, Json]:
     """Return the truth of a dive so far.
 
     Axes: x east, y north, z down from the surface, headings clockwise from true north; times in ns of the dive's own
-    clock.  ``trajectory`` rows are ``t_ns, x_m, y_m, depth_m, heading_deg``.
+    clock.  A station is where the vehicle was on average at rest.  ``trajectory`` rows are ``t_ns, x_m, y_m, depth_m,
+    heading_deg``.
     """
     feed = dive.options.feed
     walls: list[Json] = [
@@ -25,25 +26,26 @@ def truth_of(dive: Dive) -> dict[str, Json]:
         "site": dive.site.name,
         "seed": dive.seed,
         "floor_m": dive.site.floor_m,
+        "ceiling_m": dive.site.ceiling_m,
         "taper_per_m": dive.site.taper_per_m,
         "plan_depth_m": dive.site.plan_depth_m,
         "sound_speed_m_s": dive.options.sound_speed_m_s,
         "compass": {"bias_deg": feed.bias_deg, "deviation_deg": feed.deviation_deg, "sd_deg": feed.heading_sd_deg},
         "done": dive.done,
-        "stations": [_station(rest) for rest in dive.vehicle.rests],
+        "stations": [_station(dive, rest) for rest in dive.vehicle.rests],
         "trajectory": [[each.t_ns, *_row(each.place)] for each in dive.track],
         "walls": walls,
     }
 
 
-def _station(rest: Rest) -> dict[str, Json]:
-    stop = rest.stop
+def _station(dive: Dive, rest: Rest) -> dict[str, Json]:
+    place = dive.place_during(rest)
     return {
         "index": rest.index,
-        "x_m": stop.x_m,
-        "y_m": stop.y_m,
-        "depth_m": stop.depth_m,
-        "heading_deg": round(degrees(stop.heading_rad), 3),
+        "x_m": round(place.x_m, 4),
+        "y_m": round(place.y_m, 4),
+        "depth_m": round(place.depth_m, 4),
+        "heading_deg": round(degrees(place.heading_rad), 3),
         "rest_from_ns": rest.from_ns,
         "rest_to_ns": rest.to_ns,
     }

@@ -11,6 +11,9 @@ from tools.emulator.echoes import Place
 from tools.emulator.site import Stop
 
 SECOND_NS: Final = 1_000_000_000
+MOST_DRIFT_M: Final = 0.2
+_MOST_CREEP_M: Final = 0.4
+_GOLDEN_RAD: Final = 2.4
 _LEAST_MOVE_S: Final = 2.0
 
 
@@ -19,8 +22,9 @@ class VehicleOptions:
     """How the vehicle moves and rests.
 
     A rest ends after ``rest_s`` and ``circles`` full circles of the sonar, after ``rest_pings`` pings where that is
-    given, and after ``longest_rest_s`` at the latest.  ``drift_m`` and ``wobble_rad`` are the standard deviations of
-    slow wander at rest.
+    given, and after ``longest_rest_s`` at the latest.  ``sway_m``, ``heave_m`` (depth) and ``wobble_rad`` (heading) are
+    the standard deviations of slow wander.  At rest the vehicle moreover drifts by ``drift_m_s`` in a direction that
+    differs from stop to stop, ``MOST_DRIFT_M`` at most, and creeps by ``creep_m_s`` towards the next stop.
     """
 
     speed_m_s: float = 0.4
@@ -29,8 +33,19 @@ class VehicleOptions:
     rest_pings: int | None = None
     circles: float = 1.4
     longest_rest_s: float = 90.0
-    drift_m: float = 0.003
+    sway_m: float = 0.003
+    heave_m: float = 0.003
     wobble_rad: float = 0.004
+    drift_m_s: float = 0.0
+    creep_m_s: float = 0.0
+
+
+PILOTS: Final[dict[str, VehicleOptions]] = {
+    "steady": VehicleOptions(),
+    "restless": VehicleOptions(sway_m=0.025, heave_m=0.04, wobble_rad=0.03),
+    "hasty": VehicleOptions(speed_m_s=0.6, rest_s=0.0, circles=1.05, sway_m=0.008, wobble_rad=0.01, creep_m_s=0.025),
+}
+"""One who rests, one who never quite does (centimetres and degrees), one who creeps on and leaves after one circle."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +56,15 @@ class Rest:
     stop: Stop
     from_ns: int
     to_ns: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class _Leg:
+    """A way under way: since when, from where, and the points of the path."""
+
+    left_ns: int
+    start: Place
+    path_m: list[tuple[float, float]]
 
 
 class Vehicle:
@@ -54,7 +78,7 @@ class Vehicle:
         self._phase = phase
         self._index = 0
         self._arrive_ns = 0
-        self._leg: tuple[int, list[tuple[float, float]]] | None = None
+        self._leg: _Leg | None = None
         self._swept_before = 0.0
         self._pings_before = 0
 
@@ -97,10 +121,9 @@ class Vehicle:
 
     def place_at(self, t_ns: int) -> Place:
         """Where the vehicle is; only for times since the last departure."""
-        here = self._stops[self._index]
         if self._leg is not None and t_ns < self._arrive_ns:
-            return self._under_way(t_ns, *self._leg)
-        return self._wander(t_ns, here.x_m, here.y_m, here.depth_m, here.heading_rad)
+            return self._wander(t_ns, self._under_way(t_ns, self._leg))
+        return self._wander(t_ns, self._at_rest(t_ns))
 
     def _rested(self, t_ns: int, pings: int, swept_rad: float) -> bool:
         options = self._options
@@ -111,32 +134,43 @@ class Vehicle:
         return rest_s >= options.longest_rest_s or (circled and rest_s >= options.rest_s)
 
     def _leave(self, t_ns: int) -> None:
-        rest = self.rests[-1]
+        start = self._at_rest(t_ns)
         self._index += 1
         there = self._stops[self._index]
-        way = [(rest.stop.x_m, rest.stop.y_m), *there.via_m, (there.x_m, there.y_m)]
-        turn = abs(_turn(rest.stop.heading_rad, there.heading_rad))
+        path = [(start.x_m, start.y_m), *there.via_m, (there.x_m, there.y_m)]
+        turn = abs(_turn(start.heading_rad, there.heading_rad))
         # A smooth start and stop takes 15/8 of the time at the greatest speed.
-        seconds = 1.875 * max(_length(way) / self._options.speed_m_s, turn / self._options.turn_rad_s)
-        self._leg = (t_ns, way)
+        seconds = 1.875 * max(_length(path) / self._options.speed_m_s, turn / self._options.turn_rad_s)
+        self._leg = _Leg(t_ns, start, path)
         self._arrive_ns = t_ns + int(max(seconds, _LEAST_MOVE_S) * SECOND_NS)
 
-    def _under_way(self, t_ns: int, left_ns: int, way: list[tuple[float, float]]) -> Place:
-        share = max(0.0, (t_ns - left_ns) / (self._arrive_ns - left_ns))
+    def _under_way(self, t_ns: int, leg: _Leg) -> Place:
+        share = max(0.0, (t_ns - leg.left_ns) / (self._arrive_ns - leg.left_ns))
         share = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
-        last, there = self._stops[self._index - 1], self._stops[self._index]
-        x_m, y_m = _along(way, share * _length(way))
-        heading = last.heading_rad + share * _turn(last.heading_rad, there.heading_rad)
-        depth = last.depth_m + share * (there.depth_m - last.depth_m)
-        return self._wander(t_ns, x_m, y_m, depth, heading)
+        start, there = leg.start, self._stops[self._index]
+        x_m, y_m = _along(leg.path_m, share * _length(leg.path_m))
+        heading = start.heading_rad + share * _turn(start.heading_rad, there.heading_rad)
+        return Place(x_m, y_m, start.depth_m + share * (there.depth_m - start.depth_m), heading)
 
-    def _wander(self, t_ns: int, x_m: float, y_m: float, depth_m: float, heading_rad: float) -> Place:
-        drift, t_s = self._options.drift_m, t_ns / SECOND_NS
+    def _at_rest(self, t_ns: int) -> Place:
+        """Return the stop, and how far the vehicle has slipped from it meanwhile."""
+        here, after = self._stops[self._index], self._stops[self._index + 1 : self._index + 2]
+        rest_s = max(0.0, (t_ns - self._arrive_ns) / SECOND_NS) if self.started else 0.0
+        x_m, y_m = here.x_m, here.y_m
+        if self._options.creep_m_s and after:
+            path = [(x_m, y_m), *after[0].via_m, (after[0].x_m, after[0].y_m)]
+            x_m, y_m = _along(path, min(self._options.creep_m_s * rest_s, _MOST_CREEP_M))
+        slip_m = min(self._options.drift_m_s * rest_s, MOST_DRIFT_M)
+        towards = self._phase + _GOLDEN_RAD * self._index
+        return Place(x_m + slip_m * sin(towards), y_m + slip_m * cos(towards), here.depth_m, here.heading_rad)
+
+    def _wander(self, t_ns: int, place: Place) -> Place:
+        options, t_s = self._options, t_ns / SECOND_NS
         return Place(
-            x_m + drift * sway(self._phase, t_s),
-            y_m + drift * sway(self._phase + 1.7, t_s),
-            depth_m + drift * sway(self._phase + 3.1, t_s),
-            (heading_rad + self._options.wobble_rad * sway(self._phase + 4.4, t_s)) % tau,
+            place.x_m + options.sway_m * sway(self._phase, t_s),
+            place.y_m + options.sway_m * sway(self._phase + 1.7, t_s),
+            place.depth_m + options.heave_m * sway(self._phase + 3.1, t_s),
+            (place.heading_rad + options.wobble_rad * sway(self._phase + 4.4, t_s)) % tau,
         )
 
 
