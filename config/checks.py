@@ -6,20 +6,11 @@ import ipaddress
 import os
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
+from config.conflict import Conflict
+from config.feed_checks import check_feed, is_udp
 from config.schema import Config, Publish
-
-
-@dataclass(frozen=True, slots=True)
-class Conflict:
-    """A mistake of meaning: key with dots, what stands there, what would be right, what to do."""
-
-    key: str
-    got: str
-    expected: str
-    hint: str = ""
 
 
 def check(config: Config) -> list[Conflict]:
@@ -27,6 +18,8 @@ def check(config: Config) -> list[Conflict]:
     return [
         *_feed_names(config),
         *_ports(config),
+        *_water(config),
+        *(conflict for number, feed in enumerate(config.feed) for conflict in check_feed(f"feed[{number}]", feed)),
         *_sector(config),
         *_thresholds(config),
         *_addresses(config.publish),
@@ -57,11 +50,24 @@ def _feed_names(config: Config) -> Iterator[Conflict]:
 def _ports(config: Config) -> Iterator[Conflict]:
     """Two names of one device (a by-id link and its target) are the same port."""
     seen = {_device(config.sonar.port): "sonar.port"}
+    if is_udp(config.sonar.port):
+        yield Conflict("sonar.port", repr(config.sonar.port), "a port that can be written to")
     for number, feed in enumerate(config.feed):
         key = f"feed[{number}].port"
         other = seen.setdefault(_device(feed.port), key)
         if other != key:
             yield Conflict(key, repr(feed.port), "a port of its own", f"{other} is the same device")
+
+
+def _water(config: Config) -> Iterator[Conflict]:
+    site = config.site
+    if site.gravity_m_s2 is not None and site.latitude_deg is not None:
+        yield Conflict("site.gravity_m_s2", f"{site.gravity_m_s2:g}", "gravity_m_s2 or latitude_deg, not both")
+    if site.temperature_c is not None and "sound_speed_m_s" in config.sonar.model_fields_set:
+        got = f"{config.sonar.sound_speed_m_s:g}"
+        yield Conflict("sonar.sound_speed_m_s", got, "sound_speed_m_s or site.temperature_c, not both")
+    elif site.temperature_c is None and site.salinity_ppt is not None:
+        yield Conflict("site.salinity_ppt", f"{site.salinity_ppt:g}", "temperature_c beside it, for the speed of sound")
 
 
 def _device(port: str) -> str:

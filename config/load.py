@@ -13,6 +13,7 @@ from config.checks import check
 from config.errors import ConfigError, InputError
 from config.expected import expected, nearest
 from config.schema import Config
+from config.water import site_sound_speed_m_s
 
 DEFAULT: Final = Path(__file__).with_name("default.toml")
 
@@ -63,7 +64,16 @@ def _validated(file: str, raw: dict[str, Any]) -> tuple[Config | None, list[Mist
     except ValidationError as error:
         return None, _from_pydantic(file, raw, error)
     found = [Mistake(file, each.key, each.got, each.expected, each.hint) for each in check(config)]
-    return (None if found else config), found
+    return (None if found else _with_sound_speed(config)), found
+
+
+def _with_sound_speed(config: Config) -> Config:
+    """Let the site's temperature, where it is told, set the speed of sound (`config.water`)."""
+    speed_m_s = site_sound_speed_m_s(config.site)
+    if speed_m_s is None:
+        return config
+    sonar = config.sonar.model_copy(update={"sound_speed_m_s": round(speed_m_s, 2)})
+    return config.model_copy(update={"sonar": sonar})
 
 
 def _from_pydantic(file: str, raw: dict[str, Any], error: ValidationError) -> list[Mistake]:

@@ -81,6 +81,10 @@ def _usual_baud(known: dict[str, Any]) -> int:
     return BAUDS.get(known.get("driver", ""), BAUDS["nmea"])
 
 
+def _usual_quantities(known: dict[str, Any]) -> tuple[Quantity, ...]:
+    return ("depth",) if known.get("driver") == "pressure" else ("heading", "depth")
+
+
 class Feed(Section):
     """A line that tells heading, depth or altitude.  Keys that only some drivers heed say which."""
 
@@ -90,7 +94,9 @@ class Feed(Section):
     baud: int = Field(
         default_factory=_usual_baud, ge=300, le=4_000_000, description="absent: what the driver's devices usually speak"
     )
-    provides: tuple[Quantity, ...] = ("heading", "depth")
+    provides: tuple[Quantity, ...] = Field(
+        default_factory=_usual_quantities, description="absent: depth with pressure, else heading and depth"
+    )
     latency_ms: float = Field(0.0, ge=0, le=5000, description="age of a measurement when its first byte is sent")
     stale_after_s: float = Field(2.0, gt=0, le=3600, description="health calls older readings stale")
 
@@ -146,7 +152,7 @@ class Feed(Section):
     )
     pressure: Literal["absolute", "gauge"] = Field("absolute", description="nmea (XDR), pressure: gauge is 0 in air")
     address: int = Field(250, ge=1, le=250, description="pressure (keller): 250 is any single sensor")
-    channel: int = Field(1, ge=0, le=5, description="pressure (keller): 0 calculated, 1 P1, 2 P2")
+    channel: int = Field(1, ge=0, le=2, description="pressure (keller): 0 calculated, 1 P1, 2 P2")
 
 
 class Map(Section):

@@ -41,7 +41,9 @@ class LineProbe:
     @property
     def driver(self) -> str | None:
         """The driver that understands the line, None where none does."""
-        driver, feed = max(self._feeds.items(), key=lambda item: item[1].score)
+        # Any text with numbers could be a pressure sensor's: the operator must say so.
+        guesses = ((driver, feed) for driver, feed in self._feeds.items() if driver != "pressure")
+        driver, feed = max(guesses, key=lambda item: item[1].score)
         # Echoes may hold a sentence by chance and text never a frame, so frames of any weight decide.
         if self._frame_bytes * 5 >= self.rx_bytes > 0 or (self._frame_bytes and not feed.score):
             return SONAR_DRIVER
