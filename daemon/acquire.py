@@ -10,6 +10,7 @@ import contextlib
 import os
 import platform
 import sys
+import time
 from dataclasses import asdict
 from importlib.metadata import version
 from typing import Any, Final
@@ -22,12 +23,19 @@ from daemon.job import Job
 from daemon.line import Line
 from daemon.link import ANSWER, READY, Link, take_job
 from daemon.recorder import Recorder
+from daemon.turning import turning
 from drivers.decoders import SONAR_PORT
 from drivers.log import LogWriter
 from drivers.records import Json
 from drivers.tritech.head import Head
 
 _LOOK_S: Final = 0.02
+_ROUND_S: Final = 0.01
+"""Pause of each round: reading every few bytes as they come would cost several times the processor.
+
+It is a fraction of a ping, and the kernel holds a third of a second of a line.
+"""
+
 _HEALTH_NS: Final = 1_000_000_000
 
 
@@ -66,6 +74,7 @@ class Acquisition:
             self._send(self._head.tick(t_ns))
             self._recorder.tick(t_ns)
             self._tell_health(t_ns)
+            time.sleep(_ROUND_S / self._clock.rate)
         self._stop()
 
     def _open(self, must: bool) -> None:
@@ -92,6 +101,8 @@ class Acquisition:
         if not line.is_open:
             if line.is_due(t_ns) and line.try_again(t_ns):
                 self._came_back(line)
+            return
+        if self._link.ready and line.descriptor not in (None, *self._link.ready):
             return
         try:
             data = line.read(t_ns)
@@ -193,6 +204,7 @@ class Acquisition:
             "pings": self._beams.pings,
             "range_m": self._sonar.range_m,
             "gain_pct": self._sonar.gain_pct,
+            **turning(self._head),
         }
         fields: dict[str, Json] = {"ports": {**ports}, "sonar": sonar, **self._recorder.health()}
         self._link.say(snapshots.health(*self._clock.now(), fields))

@@ -51,6 +51,8 @@ class Link:
         self._poller.register(self._socket, zmq.POLLIN)
         self._poller.register(_STDIN, zmq.POLLIN)
         self._stop = False
+        self.ready: frozenset[int] = frozenset()
+        """Watched files that had something to read when the last ``wait`` ended; none where it waited in vain."""
         signal.signal(signal.SIGTERM, self._on_signal if heeds_term else signal.SIG_IGN)
         signal.signal(signal.SIGINT, signal.SIG_IGN)
 
@@ -71,6 +73,7 @@ class Link:
     def wait(self, wait_s: float) -> list[dict[str, Any]]:
         """Sleep until something comes, at most ``wait_s``; return the supervisor's commands."""
         ready = dict(self._poller.poll(int(wait_s * 1000)))
+        self.ready = frozenset(each for each in ready if isinstance(each, int))
         if _STDIN in ready and not os.read(_STDIN, 4096):
             self._stop = True
             self._poller.unregister(_STDIN)

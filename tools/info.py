@@ -8,13 +8,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from config.errors import DataError
 from config.schema import Config
 from drivers.log import Damage, LogHeader, log_files, read_log, read_metadata
 from drivers.log.header import check_format, header_of
 from drivers.log.names import session_of
+from drivers.tritech.pace import limits
 from tools.log_facts import SessionFacts, Values, port_body
 from tools.progress import counted
 
@@ -90,7 +91,7 @@ def facts(session: Session) -> dict[str, Any]:
         "site": config.site.name if session.header else None,
         **_span(gathered),
         "ports": {name: port_body(port, gathered.end_s) for name, port in gathered.ports.items()},
-        "sonar": _sonar(gathered),
+        "sonar": _sonar(gathered, config),
         "heading": _values(gathered.compass.values, "deg") | {"arc_deg": gathered.compass.arc_deg},
         "depth": _values(gathered.depth, "m"),
         "altitude": _values(gathered.altitude, "m"),
@@ -114,12 +115,19 @@ def _iso(utc_ns: int) -> str | None:
         return None
 
 
-def _sonar(gathered: SessionFacts) -> dict[str, Any]:
+def _sonar(gathered: SessionFacts, config: Config) -> dict[str, Any]:
     turning = gathered.turning
+    # Of several settings none rules the mean; the first is taken for what the dive was made with.
+    rules = None
+    if turning.pings_per_s and turning.settings:
+        bins, bin_m = turning.settings[0]["bins"], turning.settings[0]["bin_m"]
+        sampling_s = 2.0 * bins * bin_m / config.sonar.sound_speed_m_s
+        rules = limits(bins, sampling_s, config.sonar.baud).ruling(1.0 / turning.pings_per_s)
     return {
         "pings": turning.pings,
         "pings_per_s": turning.pings_per_s,
         "s_per_revolution": turning.s_per_revolution,
+        "limited_by": rules,
         "settings": turning.settings,
         "settings_changes": turning.changes,
     }
@@ -167,13 +175,21 @@ def _port_text(name: str, port: dict[str, Any]) -> Iterator[str]:
             yield f"             readings: {', '.join(doubtful)}; last because of {port['last_reason']}"
 
 
+_RULES: Final = {
+    None: "",
+    "line": ", as fast as the line carries them",
+    "sound": ", as fast as sound travels",
+    "other": ", slower than line and sound allow",
+}
+
+
 def _sonar_text(sonar: dict[str, Any]) -> Iterator[str]:
     if not sonar["pings"]:
         yield "  pings      none"
         return
     speed = f", {sonar['pings_per_s']:.2f} a second" if sonar["pings_per_s"] else ""
     turn = f", {sonar['s_per_revolution']:.1f} s per revolution" if sonar["s_per_revolution"] else ""
-    yield f"  pings      {sonar['pings']}{speed}{turn}"
+    yield f"  pings      {sonar['pings']}{speed}{turn}{_RULES[sonar['limited_by']]}"
     for each in sonar["settings"][:10]:
         sector = "full circle" if each["sector_deg"] is None else "sector {} to {} deg".format(*each["sector_deg"])
         yield (

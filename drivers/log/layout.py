@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Final
 
 from mcap.records import Schema
@@ -56,9 +57,14 @@ def topic_of(record: Record) -> str:
         return CLOCK_TOPIC
     if isinstance(record, Event):
         return EVENT_TOPIC
-    topic = f"/raw/{record.port}/{record.direction}"
+    return _raw_topic(record.port, record.direction)
+
+
+@lru_cache(maxsize=256)
+def _raw_topic(port: str, direction: Direction) -> str:
+    topic = f"/raw/{port}/{direction}"
     if _RAW.fullmatch(topic) is None:
-        raise LogError(f"cannot record port {record.port!r}: names are of a-z, 0-9, _ and -; rename the port")
+        raise LogError(f"cannot record port {port!r}: names are of a-z, 0-9, _ and -; rename the port")
     return topic
 
 

@@ -66,7 +66,9 @@ class ChannelTable:
     def message(self, record: Record) -> tuple[Channel, Message]:
         """Return the message of ``record`` and its channel; raise LogError where it cannot be recorded."""
         topic, data = topic_of(record), payload_of(record)
-        channel = self._channels.setdefault(topic, _channel(len(self._channels) + 1, topic))
+        channel = self._channels.get(topic)
+        if channel is None:
+            channel = self._channels[topic] = _channel(len(self._channels) + 1, topic)
         sequence = self._sequences.get(topic, 0)
         self._sequences[topic] = (sequence + 1) & 0xFFFFFFFF
         return channel, Message(channel.id, record.utc_ns, data, record.t_ns, sequence)

@@ -60,6 +60,7 @@ def test_tells_the_dive(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
     assert body["sonar"]["pings"] == 20
     assert body["sonar"]["pings_per_s"] == pytest.approx(10.0)
     assert body["sonar"]["s_per_revolution"] == pytest.approx(2.0)
+    assert body["sonar"]["limited_by"] == "other"
     assert [(each["since_s"], each["range_m"]) for each in body["sonar"]["settings"]] == [(0.0, 10.0), (6.0, 20.0)]
     assert body["sonar"]["settings_changes"] == 1
     assert body["heading"]["count"] == 2
