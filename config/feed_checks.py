@@ -58,10 +58,9 @@ def is_udp(port: str) -> bool:
 def _heeded(key: str, feed: Feed) -> Iterator[Conflict]:
     for name in sorted(feed.model_fields_set & set(_HEEDED)):
         if feed.driver not in _HEEDED[name] and getattr(feed, name) != Feed.model_fields[name].default:
-            drivers = " or ".join(_HEEDED[name])
-            yield Conflict(
-                f"{key}.{name}", repr(getattr(feed, name)), f"no such key with {feed.driver}", f"for {drivers}"
-            )
+            value, drivers = getattr(feed, name), " and ".join(_HEEDED[name])
+            got = "true" if value is True else repr(value)
+            yield Conflict(f"{key}.{name}", got, f"no such key with {feed.driver}", f"it is for {drivers}")
     allowed = _ANGLES.get(feed.driver)
     if allowed is not None and feed.angle_unit not in allowed:
         yield Conflict(f"{key}.angle_unit", repr(feed.angle_unit), f"{', '.join(allowed)} with {feed.driver}")

@@ -26,6 +26,7 @@ from daemon.recorder import Recorder
 from daemon.turning import turning
 from drivers.decoders import SONAR_PORT
 from drivers.log import LogWriter
+from drivers.polls import Poller
 from drivers.records import Json
 from drivers.tritech.head import Head
 
@@ -53,6 +54,7 @@ class Acquisition:
         for name, surface_mbar in job.surfaces_mbar.items():
             self._beams.tare(name, surface_mbar)
         self._lines = _lines(job)
+        self._pollers = {feed.name: Poller(feed) for feed in job.config.feed if feed.poll}
         self._told_ns = 0
         try:
             self._open(must=job.is_first)
@@ -71,7 +73,9 @@ class Acquisition:
             t_ns, _ = self._clock.now()
             for line in self._lines.values():
                 self._serve(line, t_ns)
-            self._send(self._head.tick(t_ns))
+            self._send(self._lines[SONAR_PORT], self._head.tick(t_ns))
+            for name, poller in self._pollers.items():
+                self._send(self._lines[name], poller.tick(t_ns))
             self._recorder.tick(t_ns)
             self._tell_health(t_ns)
             time.sleep(_ROUND_S / self._clock.rate)
@@ -114,11 +118,10 @@ class Acquisition:
             for each in self._beams.push(chunk):
                 self._link.say(each)
             if line.name == SONAR_PORT:
-                self._send(self._head.push(chunk.t_ns, data))
+                self._send(line, self._head.push(chunk.t_ns, data))
 
-    def _send(self, data: bytes) -> None:
-        """Record what goes to the sonar, then send it."""
-        line = self._lines[SONAR_PORT]
+    def _send(self, line: Line, data: bytes) -> None:
+        """Record what goes to the sonar, or to a feed that is polled, then send it."""
         if not data or not line.is_open:
             return
         self._recorder.chunk(line.name, "tx", data)
