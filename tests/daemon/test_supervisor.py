@@ -193,7 +193,7 @@ def test_a_second_daemon_on_a_port_is_refused(
     rig: Rig, line: tuple[int, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     rig.run(configuration(rig.folder, line[1], rig.ports))
-    rig.wait(lambda: rig.pid("acquire") is not None)
+    rig.wait(lambda: rig.health().get("ports", {}).get("sonar", {}).get("state") == "open")
     (tmp_path / "second").mkdir()
     one, two = free_ports(2)
     second = configuration(tmp_path / "second", line[1], (one, two))
