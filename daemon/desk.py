@@ -71,6 +71,10 @@ class Desk:
                 fields = {"map": self._status.map, **fields}
             self._broker.answer(waiting.route, requests.ok(waiting.request.id, fields))
 
+    def note(self, text: str) -> None:
+        """Have a word of the program's own written into the log, and published."""
+        self._tell({"token": 0, "do": "note", "fields": {"text": text}})
+
     def tick(self) -> None:
         """Give up on what the acquisition has not answered in time."""
         now_s = time.monotonic()
@@ -86,8 +90,10 @@ class Desk:
             return
         self._token += 1
         self._open[self._token] = _Open(route, request, time.monotonic() + _PATIENCE_S)
-        body = json.dumps({"token": self._token, "do": request.do, "fields": request.fields})
-        self._link.send_multipart([b"acquire", DO, body.encode()])
+        self._tell({"token": self._token, "do": request.do, "fields": request.fields})
+
+    def _tell(self, command: dict[str, Any]) -> None:
+        self._link.send_multipart([b"acquire", DO, json.dumps(command).encode()])
 
     def _objection(self, request: Request) -> Refusal | None:
         if request.do == "drop" and request.fields["station"] not in self._stations():

@@ -20,6 +20,7 @@ SAY: Final = b"say"
 READY: Final = b"ready"
 FATAL: Final = b"fatal"
 ANSWER: Final = b"answer"
+NOTE: Final = b"note"
 DO: Final = b"do"
 
 _QUEUE: Final = 2000

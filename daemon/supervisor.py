@@ -1,5 +1,7 @@
 """The supervisor: two children that do the work, the sockets that others reach, and an orderly end.
 
+A third child, where a crash left logs unfinished, makes them whole and ends.
+
 Nothing is recorded before both sockets are bound and all ports are open.  From then on a child that dies is started
 again: the acquisition goes on in the session's next segment, the map reads the log from its beginning.
 """
@@ -29,7 +31,7 @@ from daemon.child import Child
 from daemon.clock import Clock, started
 from daemon.desk import Desk
 from daemon.job import Job
-from daemon.link import ANSWER, FATAL, READY, SAY
+from daemon.link import ANSWER, FATAL, NOTE, READY, SAY
 from daemon.status import Status
 from daemon.wire import head
 
@@ -64,6 +66,7 @@ class Supervisor:
         self.session = f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{config.site.name}"
         self._acquire = Child("acquire", "daemon.acquire")
         self._map = Child("map", "daemon.follow")
+        self._salvage = Child("salvage", "daemon.salvage")
         self._status = Status(self.session, config)
         self._signals = 0
         self._is_ready = False
@@ -90,7 +93,7 @@ class Supervisor:
                 broker.listen(self._link, self._hear)
                 self._work()
         finally:
-            for child in (self._acquire, self._map):
+            for child in (self._acquire, self._map, self._salvage):
                 child.kill()
             self._link.close()
             context.term()
@@ -106,6 +109,7 @@ class Supervisor:
             self._mind(self._acquire)
             if self._is_ready:
                 self._mind(self._map)
+                self._mend()
         self._stop()
 
     def _turn(self) -> None:
@@ -126,6 +130,17 @@ class Supervisor:
         elif child.is_due() or (child.pid is None and child.starts == 0):
             child.start(self._job(is_first=False))
 
+    def _mend(self) -> None:
+        """Have earlier logs made whole, once, if there are any."""
+        if self._salvage.starts:
+            self._salvage.poll()
+        elif self._map.starts and self._has_unfinished():
+            self._salvage.start(self._job(is_first=True))
+
+    def _has_unfinished(self) -> bool:
+        parts = Path(self._config.recording.folder).glob("*.mcap.part")
+        return any(not part.name.startswith(f"{self.session}-") for part in parts)
+
     def _job(self, is_first: bool) -> Job:
         return Job(self._address, self.session, self._config, self._clock, is_first, dict(self._surfaces_mbar))
 
@@ -137,6 +152,10 @@ class Supervisor:
                 self._pass_on(frames)
             elif kind == ANSWER:
                 self._desk.hand_back(json.loads(frames[0]))
+            elif kind == NOTE:
+                text = json.loads(frames[0])["text"]
+                self._say(text)
+                self._desk.note(text)
             elif kind == READY and name == b"acquire" and not self._is_ready:
                 self._is_ready = True
                 self._say(f"recording session {self.session} in {self._config.recording.folder}")

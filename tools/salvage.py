@@ -10,7 +10,7 @@ from pathlib import Path
 
 from config.errors import DataError, LogError, UsageError
 from config.load import load_config
-from drivers.log import Damage, LogHeader, log_files, read_log, read_metadata, write_log
+from drivers.log import Damage, LogHeader, log_files, lost_in_words, read_log, read_metadata, write_log
 from drivers.log.header import check_format, signed
 from drivers.records import Event, Json, Record
 from tools.progress import counted
@@ -36,7 +36,7 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps({"log": str(args.output), "records": count, "lost": asdict(damage)}))
         return 0
     print(f"{args.output}: {count} records from {len(files)} file(s)")
-    print(f"  lost: {_lost(damage)}")
+    print(f"  lost: {lost_in_words(damage)}")
     return 0
 
 
@@ -47,7 +47,7 @@ def salvaged(files: Sequence[Path], damage: Damage) -> Iterator[Record]:
         yield last
     if last is not None:
         lost: dict[str, Json] = {**asdict(damage)}
-        text = f"salvaged from {', '.join(path.name for path in files)}; lost: {_lost(damage)}"
+        text = f"salvaged from {', '.join(path.name for path in files)}; lost: {lost_in_words(damage)}"
         yield Event(last.t_ns, last.utc_ns, "note", {"text": text, "lost": lost})
 
 
@@ -75,14 +75,3 @@ def _metadata(files: Sequence[Path], config: Path | None, output: Path) -> dict[
         session, metadata = next(iter(found.items()))
         return signed(metadata | {"session": output.stem, "segment": "1", "previous": "", "salvaged_from": session})
     raise failure or DataError(f"{files[0]}: nothing in it is readable")
-
-
-def _lost(damage: Damage) -> str:
-    if not damage.is_any:
-        return "nothing"
-    words = [f"{damage.chunks_skipped} chunks", f"{damage.bytes_skipped} bytes that belong to nothing readable"]
-    if damage.records_missing:
-        words.append(f"{damage.records_missing} records by their numbers")
-    if damage.files_unreadable:
-        words.append(f"{damage.files_unreadable} files in which nothing could be read")
-    return ", ".join(words)

@@ -8,7 +8,9 @@ schemas of its messages, and a chunk with its index goes out in one write.
 
 from __future__ import annotations
 
+import contextlib
 import errno
+import fcntl
 import os
 import zlib
 from collections.abc import Iterable, Mapping
@@ -112,6 +114,7 @@ class Segment:
         self._path = path
         self._part = path.with_name(path.name + PART)
         self._file = self._part.open("xb", buffering=0)
+        _hold(self._file.fileno())
         self._channels: dict[int, Channel] = {}
         self._counts: dict[int, int] = {}
         self._indexes: list[ChunkIndex] = []
@@ -215,6 +218,12 @@ class Segment:
             # A nearly full disk takes a part and says so only by the count.
             rest = rest[self._file.write(rest) :]
         self.size += len(data)
+
+
+def _hold(descriptor: int) -> None:
+    """Show others that the file is being written: the lock ends with the process, however it ends."""
+    with contextlib.suppress(OSError):  # a file system without locks
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def sync_folder(folder: Path) -> None:
