@@ -18,6 +18,7 @@ COMMANDS: Final[dict[str, tuple[str, str]]] = {
     "view": ("tools.view", "the mesh in an Open3D window"),
     "dashboard": ("tools.dashboard_command", "the live page in a browser"),
     "fill": ("tools.fill_map", "fill the holes of a ROS map_server map"),
+    "probe": ("tools.probe", "what speaks on a port, at which baud rate"),
     "ports": ("tools.ports", "the serial ports of this machine"),
     "check-config": ("tools.check_config", "say every mistake of a configuration file"),
     "replay": ("tools.replay", "map recorded logs as if they were live"),

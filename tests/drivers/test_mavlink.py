@@ -15,32 +15,11 @@ from hypothesis import strategies as st
 from config.schema import Feed, Site
 from drivers.mavlink import LAYOUTS, MavlinkReader, crc
 from drivers.wire import Cutter
+from tests.drivers.feedframes import attitude, mavlink1, mavlink2, scaled_pressure
 from tests.drivers.feedkit import CUTS, assert_any_cut_is_the_same, opinions, plain, run
 
 LINE = Feed(driver="mavlink", surface_mbar=1013.25, max_turn_deg_s=3600)
 IDS = {layout.name: number for number, layout in LAYOUTS.items()}
-
-
-def v2(
-    number: int, payload: bytes, system: int = 1, component: int = 1, flags: int = 0, signature: bytes = b""
-) -> bytes:
-    cut = payload.rstrip(b"\0") or payload[:1]
-    body = bytes((len(cut), flags, 0, 7, system, component)) + number.to_bytes(3, "little") + cut
-    extra = LAYOUTS[number].extra if number in LAYOUTS else 99
-    return b"\xfd" + body + crc(body, extra).to_bytes(2, "little") + signature
-
-
-def v1(number: int, payload: bytes, system: int = 1, component: int = 1) -> bytes:
-    body = bytes((len(payload), 7, system, component, number)) + payload
-    return b"\xfe" + body + crc(body, LAYOUTS[number].extra).to_bytes(2, "little")
-
-
-def attitude(yaw_rad: float, boot_ms: int = 1) -> bytes:
-    return struct.pack("<Iffffff", boot_ms, 0.1, 0.2, yaw_rad, 0, 0, 0.05)
-
-
-def pressure(mbar: float, boot_ms: int = 1) -> bytes:
-    return struct.pack("<Iffh", boot_ms, mbar, 0.0, 1934)
 
 
 def vectors(shared_data: Path) -> list[tuple[bytes, dict[str, Any]]]:
@@ -84,12 +63,16 @@ def test_the_checksum_is_the_documented_one() -> None:
     ("yaw_rad", "heading_deg"), [(-math.pi, 180.0), (math.pi, 180.0), (0.0, 0.0), (-1e-9, 360.0), (0.5, 28.647890)]
 )
 def test_yaw_becomes_a_heading(yaw_rad: float, heading_deg: float) -> None:
-    (reading,) = run(LINE, [(0, v2(30, attitude(yaw_rad)))])[0]
+    (reading,) = run(LINE, [(0, mavlink2(30, attitude(yaw_rad)))])[0]
     assert (plain(reading)[1] - heading_deg + 180) % 360 - 180 == pytest.approx(0, abs=1e-4)
 
 
 def test_both_versions_and_signed_frames() -> None:
-    frames = [v1(30, attitude(1.0)), v2(30, attitude(1.0)), v2(30, attitude(1.0), flags=1, signature=bytes(range(13)))]
+    frames = [
+        mavlink1(30, attitude(1.0)),
+        mavlink2(30, attitude(1.0)),
+        mavlink2(30, attitude(1.0), flags=1, signature=bytes(range(13))),
+    ]
     for data in (b"".join(frames), b"".join(frames[::-1])):
         readings, counters = run(LINE, [(0, data)])
         assert [plain(each)[1] for each in readings] == pytest.approx([math.degrees(1.0)] * 3, abs=1e-4)
@@ -97,7 +80,7 @@ def test_both_versions_and_signed_frames() -> None:
 
 
 def test_headings_may_come_from_another_message_and_north() -> None:
-    data = v2(30, attitude(1.0)) + v2(74, struct.pack("<ffffhH", 0, 0, 0, 0, 270, 50))
+    data = mavlink2(30, attitude(1.0)) + mavlink2(74, struct.pack("<ffffhH", 0, 0, 0, 0, 270, 50))
     site = Site(declination_deg=3.9)
     for feed, headings in (
         (LINE, [math.degrees(1.0) + 3.9]),
@@ -109,15 +92,19 @@ def test_headings_may_come_from_another_message_and_north() -> None:
 
 
 def test_depth_comes_from_the_configured_pressure() -> None:
-    data = v2(29, pressure(1009.5)) + v2(137, pressure(1313.25)) + v2(143, pressure(1111.25))
+    data = (
+        mavlink2(29, scaled_pressure(1009.5))
+        + mavlink2(137, scaled_pressure(1313.25))
+        + mavlink2(143, scaled_pressure(1111.25))
+    )
     for number, gauge_mbar in ((1, -3.75), (2, 300.0), (3, 98.0)):
         (reading,) = run(LINE.model_copy(update={"pressure_message": number}), [(0, data)])[0]
         assert plain(reading)[1] == pytest.approx(gauge_mbar * 100 / (997 * 9.80665), abs=1e-5)
 
 
 def test_only_the_autopilot_of_one_vehicle_is_heard() -> None:
-    camera, other = v2(30, attitude(2.0), component=100), v2(30, attitude(3.0), system=2)
-    data = camera + v2(30, attitude(1.0)) + other + v1(30, attitude(1.5, 2))
+    camera, other = mavlink2(30, attitude(2.0), component=100), mavlink2(30, attitude(3.0), system=2)
+    data = camera + mavlink2(30, attitude(1.0)) + other + mavlink1(30, attitude(1.5, 2))
     readings, counters = run(LINE, [(0, data)])
     assert [plain(each)[1] for each in readings] == pytest.approx([math.degrees(1.0), math.degrees(1.5)], abs=1e-4)
     assert counters.frames == {"ATTITUDE": 2, "other_system": 2}
@@ -127,14 +114,14 @@ def test_only_the_autopilot_of_one_vehicle_is_heard() -> None:
 
 def test_a_heartbeat_names_the_vehicle() -> None:
     reader = MavlinkReader(LINE)
-    reader.push(0, v2(0, struct.pack("<IBBBBB", 19, 12, 3, 209, 4, 3)))
+    reader.push(0, mavlink2(0, struct.pack("<IBBBBB", 19, 12, 3, 209, 4, 3)))
     assert reader.speaker == "system 1: submarine with ArduPilot"
 
 
 def test_unknown_messages_are_skipped_whole_between_frames() -> None:
     # An unknown message whose payload holds a whole frame: read only where the stream is not followed yet.
-    inner = v2(30, attitude(2.0))
-    known, unknown = v2(30, attitude(1.0)), v2(9000, inner)
+    inner = mavlink2(30, attitude(2.0))
+    known, unknown = mavlink2(30, attitude(1.0)), mavlink2(9000, inner)
     readings, counters = run(LINE, [(0, known + unknown + known)])
     assert [plain(each)[1] for each in readings] == pytest.approx([math.degrees(1.0)] * 2, abs=1e-4)
     assert counters.frames == {"ATTITUDE": 2, "other": 1}
@@ -143,7 +130,7 @@ def test_unknown_messages_are_skipped_whole_between_frames() -> None:
 
 @pytest.mark.parametrize("index", [1, 4, 5, 8, 12, 20, 36])
 def test_a_damaged_frame_is_refused_and_the_next_one_read(index: int) -> None:
-    frame = v2(30, attitude(1.0))
+    frame = mavlink2(30, attitude(1.0))
     broken = bytearray(frame)
     broken[index] ^= 0x15
     readings, counters = run(LINE, [(0, bytes(broken) + frame * 2)])
@@ -153,7 +140,10 @@ def test_a_damaged_frame_is_refused_and_the_next_one_read(index: int) -> None:
 
 def test_what_is_no_number_and_a_clock_that_stands() -> None:
     data = (
-        v2(30, attitude(math.nan)) + v2(137, pressure(math.inf)) + v2(30, attitude(1.0, 5)) * 2 + v2(30, attitude(1, 6))
+        mavlink2(30, attitude(math.nan))
+        + mavlink2(137, scaled_pressure(math.inf))
+        + mavlink2(30, attitude(1.0, 5)) * 2
+        + mavlink2(30, attitude(1, 6))
     )
     readings, counters = run(LINE, [(0, data)])
     assert counters.bad == {"field": 2}
@@ -167,21 +157,21 @@ def test_what_is_no_number_and_a_clock_that_stands() -> None:
 def test_the_field_is_watched_through_raw_values() -> None:
     feed = LINE.model_copy(update={"field_strength": 440.0})
     raw = [struct.pack("<QhhhhhhhhhBh", 1, 0, 0, 0, 0, 0, 0, x, -15, 385, 0, 0)[:26] for x in (210, 410)]
-    data = v2(27, raw[0]) + v2(30, attitude(1.0, 1)) + v2(27, raw[1]) + v2(30, attitude(1.0, 2))
+    data = mavlink2(27, raw[0]) + mavlink2(30, attitude(1.0, 1)) + mavlink2(27, raw[1]) + mavlink2(30, attitude(1.0, 2))
     assert [quality for quality, _ in opinions(run(feed, [(0, data)])[0])] == ["good", "suspect"]
 
 
 PIECES = st.lists(
     st.sampled_from(
         [
-            v2(30, attitude(1.0)),
-            v1(30, attitude(2.0)),
-            v2(137, pressure(1200.0)),
-            v2(9000, b"payload"),
-            v2(30, attitude(1.0), flags=1, signature=bytes(13)),
+            mavlink2(30, attitude(1.0)),
+            mavlink1(30, attitude(2.0)),
+            mavlink2(137, scaled_pressure(1200.0)),
+            mavlink2(9000, b"payload"),
+            mavlink2(30, attitude(1.0), flags=1, signature=bytes(13)),
             b"\xfd",
             b"\xfe\x1c",
-            v2(30, attitude(1.0))[:20],
+            mavlink2(30, attitude(1.0))[:20],
         ]
     )
     | st.binary(max_size=12),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 from pathlib import Path
 
 import pytest
@@ -10,9 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from config.schema import Feed, Site
-from drivers.keller import KellerReader, crc16, initialise, read_channel, with_crc
+from drivers.keller import KellerReader, crc16, initialise, read_channel
 from drivers.polls import Poller
 from drivers.pressure import TextReader
+from tests.drivers.feedframes import keller_reply
 from tests.drivers.feedkit import CUTS, assert_any_cut_is_the_same, opinions, plain, run
 
 TEXT = Feed(driver="pressure", port="/dev/p", surface_mbar=1013.25)
@@ -116,10 +116,6 @@ def test_checksums_and_requests_are_those_of_the_manual() -> None:
     assert initialise(250) == bytes.fromhex("fa300443")
     assert read_channel(250, 1) == bytes.fromhex("fa4901a1a7")
     assert crc16(b"123456789") == 0x4B37  # the catalogue's check value of CRC-16/MODBUS
-
-
-def keller_reply(bar: float, status: int = 0, address: int = 1) -> bytes:
-    return with_crc(bytes((address, 73)) + struct.pack(">fB", bar, status))
 
 
 def test_what_a_keller_sensor_says_of_itself() -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import reduce
-from operator import xor
 from pathlib import Path
 
 import pytest
@@ -14,29 +12,12 @@ from config.schema import Feed, Site
 from drivers.polls import Poller
 from drivers.videoray_pro3 import Pro3Reader
 from drivers.videoray_pro4 import NAVIGATION_REQUEST, Pro4Reader
+from tests.drivers.feedframes import PRO3_REQUEST, pro3_reply, pro4_navigation, pro4_packet
 from tests.drivers.feedkit import CUTS, assert_any_cut_is_the_same, opinions, plain, run
 
 PRO3 = Feed(driver="videoray_pro3", port="/dev/p", depth_points=((1017, 0.0), (313, 34.2)), max_turn_deg_s=3600)
 STEADY = PRO3.model_copy(update={"max_dive_m_s": 100.0})
 PRO4 = Feed(driver="videoray_pro4", port="/dev/p", surface_mbar=1013.25)
-REQUEST = bytes.fromhex("2331000000000010")
-
-
-def reply(orientation: int, count: int) -> bytes:
-    return b"\x28\x31\x02" + orientation.to_bytes(2, "little") + count.to_bytes(2, "little")
-
-
-def packet(flags: int, address: int, payload: bytes, sync: bytes = b"\xfd\xdf") -> bytes:
-    long = len(payload) >= 255
-    head = sync + bytes((1, flags, address, 255 if long else len(payload)))
-    size = len(payload).to_bytes(2, "little")
-    extension = size + bytes((size[0] ^ size[1],)) if long else b""
-    return head + bytes((reduce(xor, head),)) + extension + payload + bytes((reduce(xor, payload, 0),))
-
-
-def navigation(heading: int, mbar: int, flags: int = 2) -> bytes:
-    words = (heading, 37, -30, mbar)
-    return packet(flags, 0, b"\x01" + b"".join(word.to_bytes(2, "little", signed=True) for word in words))
 
 
 def pro3_vectors(shared_data: Path) -> list[bytes]:
@@ -58,9 +39,9 @@ def pro3_vectors(shared_data: Path) -> list[bytes]:
 def test_replies_of_a_pro_3(shared_data: Path, index: int, heading_deg: int, count: int) -> None:
     frame = pro3_vectors(shared_data)[index]
     reader = Pro3Reader(PRO3)
-    (message,) = reader.push(0, frame + REQUEST)
+    (message,) = reader.push(0, frame + PRO3_REQUEST)
     assert (message.statements[0].value, reader.count) == (heading_deg, count)
-    readings, counters = run(PRO3, [(0, frame + REQUEST * 2)])
+    readings, counters = run(PRO3, [(0, frame + PRO3_REQUEST * 2)])
     depth_m = 34.2 * (1017 - count) / (1017 - 313)
     assert [plain(each) for each in readings] == [("heading", heading_deg), ("depth", round(depth_m, 6))]
     assert counters.frames == {"reply": 1, "request": 2}
@@ -69,7 +50,7 @@ def test_replies_of_a_pro_3(shared_data: Path, index: int, heading_deg: int, cou
 def test_all_of_a_pro_3_on_one_line(shared_data: Path) -> None:
     frames = pro3_vectors(shared_data)
     assert len(frames) == 7
-    wire = b"".join(REQUEST + each for each in frames[1:]) + REQUEST
+    wire = b"".join(PRO3_REQUEST + each for each in frames[1:]) + PRO3_REQUEST
     readings, counters = run(PRO3.model_copy(update={"provides": ("heading",)}), [(0, wire)])
     assert counters.frames == {"reply": 6, "request": 7}
     assert counters.skipped_bytes == 0
@@ -78,30 +59,30 @@ def test_all_of_a_pro_3_on_one_line(shared_data: Path) -> None:
 
 def test_an_uncalibrated_pro_3_tells_headings_only() -> None:
     feed = PRO3.model_copy(update={"depth_points": None})
-    readings, _ = run(feed, [(0, reply(90, 500) * 2)], Site(declination_deg=4.0))
+    readings, _ = run(feed, [(0, pro3_reply(90, 500) * 2)], Site(declination_deg=4.0))
     assert [plain(each) for each in readings] == [("heading", 184.0)] * 2
 
 
 def test_a_lone_pro_3_reply_is_not_believed_and_a_followed_one_is() -> None:
-    assert run(PRO3, [(0, b"\x31\x02" + reply(90, 500))])[0] == []
-    readings, counters = run(STEADY, [(0, b"\x31\x02" + reply(90, 500) + reply(91, 500))])
+    assert run(PRO3, [(0, b"\x31\x02" + pro3_reply(90, 500))])[0] == []
+    readings, counters = run(STEADY, [(0, b"\x31\x02" + pro3_reply(90, 500) + pro3_reply(91, 500))])
     assert [plain(each)[1] for each in readings if plain(each)[0] == "heading"] == [180, 179]
     assert counters.skipped_bytes == 2
 
 
 @pytest.mark.parametrize("lost", range(7))
-@pytest.mark.parametrize("after", [reply(91, 500), REQUEST])
+@pytest.mark.parametrize("after", [pro3_reply(91, 500), PRO3_REQUEST])
 def test_a_lost_byte_costs_one_pro_3_reply(lost: int, after: bytes) -> None:
-    whole = reply(90, 500)
+    whole = pro3_reply(90, 500)
     wire = whole * 3 + whole[:lost] + whole[lost + 1 :] + after + whole * 2
     readings, _ = run(PRO3.model_copy(update={"provides": ("heading",)}), [(0, wire)])
     headings = [plain(each)[1] for each in readings]
-    assert headings == [180] * 3 + [179] * (after != REQUEST) + [180] * 2
+    assert headings == [180] * 3 + [179] * (after != PRO3_REQUEST) + [180] * 2
 
 
-@pytest.mark.parametrize("frame", [reply(360, 500), reply(90, 1024), b"\x28\x32" + bytes(5)])
+@pytest.mark.parametrize("frame", [pro3_reply(360, 500), pro3_reply(90, 1024), b"\x28\x32" + bytes(5)])
 def test_implausible_pro_3_replies_are_refused(frame: bytes) -> None:
-    readings, counters = run(PRO3, [(0, reply(90, 500) * 2 + frame + reply(90, 500) * 2)])
+    readings, counters = run(PRO3, [(0, pro3_reply(90, 500) * 2 + frame + pro3_reply(90, 500) * 2)])
     assert len(readings) == 2 * 4
     assert counters.skipped_bytes == 7
 
@@ -145,34 +126,34 @@ def test_every_packet_of_the_document_on_one_line(shared_data: Path) -> None:
 
 @pytest.mark.parametrize("flags", [1, 2, 3, 4, 5])
 def test_heading_and_depth_of_a_pro_4(flags: int) -> None:
-    readings, _ = run(PRO4, [(0, navigation(-132, 1313, flags))], Site(declination_deg=3.9))
+    readings, _ = run(PRO4, [(0, pro4_navigation(-132, 1313, flags))], Site(declination_deg=3.9))
     depth_m = round((1313 - 1013.25) * 100 / (997 * 9.80665), 6)
     assert [plain(each) for each in readings] == [("heading", 350.7), ("depth", depth_m)]
 
 
 def test_units_of_early_firmware_and_registers_elsewhere() -> None:
     early = PRO4.model_copy(update={"angle_unit": "deg"})
-    assert plain(run(early, [(0, navigation(274, 1100))])[0][0]) == ("heading", 274.0)
-    assert run(early, [(0, navigation(2740, 1100))])[1].bad == {"field": 1}
+    assert plain(run(early, [(0, pro4_navigation(274, 1100))])[0][0]) == ("heading", 274.0)
+    assert run(early, [(0, pro4_navigation(2740, 1100))])[1].bad == {"field": 1}
     words = (1100).to_bytes(2, "little") + (1234).to_bytes(2, "little")
-    assert plain(run(PRO4, [(0, packet(0x88, 0x66, b"\x01" + words + bytes(4)))])[0][0]) == ("heading", 123.4)
-    assert run(PRO4, [(0, packet(0x88, 0x67, b"\x01" + words + bytes(4)))])[0] == []
-    assert run(PRO4, [(0, packet(0x82, 0x66, b"\x01" + words[:2]))])[1].frames == {"other": 1}
-    assert run(PRO4, [(0, packet(2, 0, b"\x02" + bytes(8)))])[1].frames == {"other": 1}
-    assert run(PRO4, [(0, packet(2, 0, b""))])[1].frames == {"other": 1}
+    assert plain(run(PRO4, [(0, pro4_packet(0x88, 0x66, b"\x01" + words + bytes(4)))])[0][0]) == ("heading", 123.4)
+    assert run(PRO4, [(0, pro4_packet(0x88, 0x67, b"\x01" + words + bytes(4)))])[0] == []
+    assert run(PRO4, [(0, pro4_packet(0x82, 0x66, b"\x01" + words[:2]))])[1].frames == {"other": 1}
+    assert run(PRO4, [(0, pro4_packet(2, 0, b"\x02" + bytes(8)))])[1].frames == {"other": 1}
+    assert run(PRO4, [(0, pro4_packet(2, 0, b""))])[1].frames == {"other": 1}
 
 
 @pytest.mark.parametrize("index", [0, 2, 5, 6, 8, 16])
 def test_a_damaged_packet_is_refused_and_the_next_one_read(index: int) -> None:
-    broken = bytearray(navigation(100, 1100))
+    broken = bytearray(pro4_navigation(100, 1100))
     broken[index] ^= 0x11
-    readings, counters = run(PRO4, [(0, bytes(broken) + navigation(200, 1100))])
+    readings, counters = run(PRO4, [(0, bytes(broken) + pro4_navigation(200, 1100))])
     assert [plain(each)[1] for each in readings][:1] == [20.0]
     assert counters.skipped_bytes == 17
 
 
 def test_only_the_request_without_data_is_ever_sent() -> None:
-    assert packet(5, 0, b"", b"\xfa\xaf") == NAVIGATION_REQUEST
+    assert pro4_packet(5, 0, b"", b"\xfa\xaf") == NAVIGATION_REQUEST
     assert Poller(PRO4).tick(0) == b""
     assert Poller(PRO3.model_copy(update={"poll": True})).tick(0) == b""
     poller = Poller(PRO4.model_copy(update={"poll": True, "poll_hz": 10.0}))
@@ -182,13 +163,21 @@ def test_only_the_request_without_data_is_ever_sent() -> None:
 
 
 PRO3_PIECES = st.lists(
-    st.sampled_from([reply(90, 500), reply(10, 900), REQUEST, b"\x28\x31", b"\x28", reply(1, 1)[:5]])
+    st.sampled_from(
+        [pro3_reply(90, 500), pro3_reply(10, 900), PRO3_REQUEST, b"\x28\x31", b"\x28", pro3_reply(1, 1)[:5]]
+    )
     | st.binary(max_size=4),
     max_size=12,
 ).map(b"".join)
 PRO4_PIECES = st.lists(
     st.sampled_from(
-        [navigation(100, 1100), navigation(-100, 1200), NAVIGATION_REQUEST, packet(0, 0, bytes(300)), b"\xfd"]
+        [
+            pro4_navigation(100, 1100),
+            pro4_navigation(-100, 1200),
+            NAVIGATION_REQUEST,
+            pro4_packet(0, 0, bytes(300)),
+            b"\xfd",
+        ]
     )
     | st.binary(max_size=4),
     max_size=8,
