@@ -29,14 +29,17 @@ class Logistic:
         """Probability ``(n,)`` for features ``(n, k)``."""
         return sigmoid(features @ self.weights)
 
-    def taught(self, features: NDArray[np.float64], right: NDArray[np.float64]) -> Logistic:
-        """Return the model after outcomes ``right`` ``(n,)`` of 0 or 1 were seen: maximum a posteriori by Newton."""
+    def taught(self, features: NDArray[np.float64], right: NDArray[np.float64], count: NDArray[np.float64]) -> Logistic:
+        """Return the model after outcomes ``right`` ``(n,)`` of 0 or 1 were seen, each counting as ``count`` ``(n,)``.
+
+        Maximum a posteriori, by Newton's method.
+        """
         weights = self.weights
         curvature = self.precision
         for _ in range(_STEPS):
             chance = sigmoid(features @ weights)
-            slope = features.T @ (right - chance) - self.precision @ (weights - self.weights)
-            curvature = self.precision + (features * (chance * (1.0 - chance))[:, None]).T @ features
+            slope = features.T @ (count * (right - chance)) - self.precision @ (weights - self.weights)
+            curvature = self.precision + (features * (count * chance * (1.0 - chance))[:, None]).T @ features
             weights = weights + np.linalg.solve(curvature, slope)
         return Logistic(weights, curvature)
 

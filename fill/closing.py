@@ -15,12 +15,13 @@ from fill.candidates import Candidate
 from fill.certainty import Logistic
 from fill.freedom import capped
 from fill.matching import assign, candidates, gain
-from fill.segments import find_walls
+from fill.segments import Walls, find_walls
 from mapping.values import OCCUPIED, UNKNOWN
 
-THRESHOLD: Final = 0.4
+THRESHOLD: Final = 0.35
 """A fill less likely right than this is not drawn: the end stays open."""
-_FIRST_ROUND: Final = 4.0  # cells; each round reaches twice as far
+_FIRST_ROUND: Final = 4.0  # cells
+_WIDER: Final = 3.0  # each round reaches so much further
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,35 +40,53 @@ class Closed:
 
 def close_holes(
     state: NDArray[np.uint8], longest: float, model: Logistic, threshold: float = THRESHOLD
-) -> tuple[list[Closed], NDArray[np.float64]]:
-    """Close the holes of ``state`` ``(rows, cols)`` up to ``longest`` cells.
-
-    Also returns the ends left open, ``(n, 2)`` of x and y in cells.
-    """
+) -> list[Closed]:
+    """Close the holes of ``state`` ``(rows, cols)`` up to ``longest`` cells."""
     wall = state == OCCUPIED
+    walls = _open_walls(wall, state)
     closed: list[Closed] = []
     for reach in _rounds(longest):
-        walls = find_walls(wall)
-        walls = dataclasses.replace(walls, ends=tuple(end for end in walls.ends if not capped(end, state)))
-        found = candidates(walls, state, reach)
-        if not found:
-            continue
-        chances = model.chance(np.stack([each.features for each in found]))
-        gains = [gain(float(chance), threshold) for chance in chances]
-        for index in assign(found, gains):
-            cells = fill_cells(found[index], state, wall)
-            if len(cells):
-                closed.append(Closed(found[index], cells, _away(cells, found[index]), float(chances[index])))
-                wall[cells[:, 0], cells[:, 1]] = True
-    left = [end for end in find_walls(wall).ends if not capped(end, state)]
-    return closed, np.array([(end.x, end.y) for end in left]).reshape(-1, 2)
+        fresh = _close_round(candidates(walls, state, reach), model, threshold, state, wall)
+        if fresh:
+            walls = _open_walls(wall, state)
+        closed += fresh
+    return closed
+
+
+def open_ends(state: NDArray[np.uint8], closed: list[Closed]) -> NDArray[np.float64]:
+    """Return the ends of walls ``(n, 2)``, x and y in cells, that are still open with these holes closed."""
+    wall = state == OCCUPIED
+    for each in closed:
+        wall[each.cells[:, 0], each.cells[:, 1]] = True
+    return np.array([(end.x, end.y) for end in _open_walls(wall, state).ends]).reshape(-1, 2)
+
+
+def _open_walls(wall: NDArray[np.bool_], state: NDArray[np.uint8]) -> Walls:
+    walls = find_walls(wall)
+    return dataclasses.replace(walls, ends=tuple(end for end in walls.ends if not capped(end, state)))
+
+
+def _close_round(
+    found: list[Candidate], model: Logistic, threshold: float, state: NDArray[np.uint8], wall: NDArray[np.bool_]
+) -> list[Closed]:
+    """Take the best candidates, and mark their cells in ``wall``."""
+    if not found:
+        return []
+    chances = model.chance(np.stack([each.features for each in found]))
+    closed: list[Closed] = []
+    for index in assign(found, [gain(float(chance), threshold) for chance in chances]):
+        cells = fill_cells(found[index], state, wall)
+        if len(cells):
+            closed.append(Closed(found[index], cells, _away(cells, found[index]), float(chances[index])))
+            wall[cells[:, 0], cells[:, 1]] = True
+    return closed
 
 
 def _rounds(longest: float) -> Iterator[float]:
     reach = _FIRST_ROUND
     while reach < longest:
         yield reach
-        reach *= 2.0
+        reach *= _WIDER
     yield longest
 
 

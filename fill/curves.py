@@ -82,16 +82,12 @@ def straight(x0: float, y0: float, x1: float, y1: float, name: str = "line") -> 
     return Curve(name, _sampled(np.array([[x0, y0], [x1, y1]])))
 
 
-def bowed(curve: Curve, height: float) -> Curve:
-    """Push the middle of a curve sideways by ``height`` cells, its ends staying where they are."""
-    points = curve.points
-    ahead = points[-1] - points[0]
-    length = math.hypot(*ahead)
-    if length == 0 or height == 0:
-        return curve
-    share = np.linspace(0.0, 1.0, len(points))
-    normal = np.array([-ahead[1], ahead[0]]) / length
-    return Curve(curve.name, points + (4.0 * share * (1.0 - share) * height)[:, None] * normal)
+def bowed(curve: Curve, heights: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Points ``(h, n, 2)`` of a curve with its middle pushed sideways by each of ``heights`` ``(h,)`` cells."""
+    ahead = curve.points[-1] - curve.points[0]
+    share = np.linspace(0.0, 1.0, len(curve.points))
+    normal = np.array([-ahead[1], ahead[0]]) / max(math.hypot(*ahead), 1e-9)
+    return curve.points + (heights[:, None] * (4.0 * share * (1.0 - share)))[:, :, None] * normal
 
 
 def cells_of(points: NDArray[np.float64]) -> NDArray[np.int32]:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from config.schema import Fill
 from fill.certainty import Belief, hole_certainty
-from fill.closing import Closed, close_holes
+from fill.closing import Closed, close_holes, open_ends
 from fill.lessons import learn
 from fill.prior import prior
 from fill.values import Filled, Hole
@@ -26,9 +26,9 @@ class Filler:
         longest = self._config.max_gap_m / grid.cell_m
         random = np.random.default_rng(self._config.seed)
         belief = learn(grid.state, longest, prior(), random)
-        closed, left = close_holes(grid.state, longest, belief.hole)
+        closed = close_holes(grid.state, longest, belief.hole)
         holes = tuple(_hole(index, each, belief, grid) for index, each in enumerate(closed))
-        return filled_grid(grid, holes, places_m(left, grid))
+        return filled_grid(grid, holes, places_m(open_ends(grid.state, closed), grid))
 
 
 def filled_grid(grid: Grid, holes: tuple[Hole, ...], open_ends_m: NDArray[np.float64]) -> Filled:

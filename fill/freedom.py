@@ -6,6 +6,8 @@ crossed, nor slipped through between two free cells that touch at a corner.
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -16,6 +18,8 @@ from mapping.values import FREE, UNKNOWN
 
 _NEAR: Final = 2.0  # cells from the wall's face where the sides are looked at, to
 _FAR: Final = 7.0
+_DENSE: Final = 4  # cells of water in a row that are water and not a stray ray
+_LOOKS: Final = 10  # places along a curve
 
 
 def at(state: NDArray[np.uint8], x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.uint8]:
@@ -49,28 +53,42 @@ def clear_path(cells: NDArray[np.int32], state: NDArray[np.uint8]) -> NDArray[np
     return np.insert(cells, slant + 1, joint, axis=0)
 
 
-def sides(
-    points: NDArray[np.float64], half: float, state: NDArray[np.uint8]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Share of free water on the left and on the right of each tenth of a curve, two to seven cells off its face."""
-    pick = points[np.linspace(0, len(points) - 1, 10).astype(np.int64)]
+_FAN: Final = np.array(
+    [(ahead, aside) for ahead in (0.0, 1.0, 2.0, 3.0) for aside in (-3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0)
+     if 0.5 < math.hypot(ahead, aside) <= 3.2]
+).T  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Sides:
+    """What lies on either side of a curve, looked at square to it from ten places along it.
+
+    Left side first: ``near`` ``(2, 10)`` float64 is the share of free water two to seven cells off the wall's face,
+    ``snug`` ``(2, 10)`` of that within two cells, ``water`` ``(2, 10)`` bool whether the first thing seen, however far
+    within the reach, is free water and no stray ray.
+    """
+
+    near: NDArray[np.float64]
+    snug: NDArray[np.float64]
+    water: NDArray[np.bool_]
+
+
+def sides(points: NDArray[np.float64], half: float, state: NDArray[np.uint8], reach: float = _FAR) -> Sides:
+    """Look to both sides of a curve ``(n, 2)``, up to ``reach`` cells off the face of a wall of ``half`` thickness."""
+    pick = points[np.linspace(0, len(points) - 1, _LOOKS).astype(np.int64)]
     ahead = np.gradient(pick, axis=0)
     ahead /= np.maximum(np.hypot(ahead[:, 0], ahead[:, 1]), 1e-9)[:, None]
-    off = np.arange(_NEAR, _FAR + 1.0) + half - 0.5
-    shares = []
-    for sign in (1.0, -1.0):
-        x = pick[:, 0, None] - sign * ahead[:, 1, None] * off
-        y = pick[:, 1, None] + sign * ahead[:, 0, None] * off
-        shares.append(np.mean(at(state, x, y) == FREE, axis=1))
-    return shares[0], shares[1]
+    off = np.arange(1.0, max(reach, _FAR) + 1.0) + half - 0.5
+    lateral = np.array([1.0, -1.0])[:, None, None] * off
+    seen = at(state, pick[:, 0, None] - lateral * ahead[:, 1, None], pick[:, 1, None] + lateral * ahead[:, 0, None])
+    near = np.mean(seen[:, :, int(_NEAR) - 1 : int(_FAR)] == FREE, axis=2)
+    first = np.argmax(seen != UNKNOWN, axis=2)[:, :, None] + np.arange(_DENSE)
+    water = np.mean(np.take_along_axis(seen, np.minimum(first, len(off) - 1), axis=2) == FREE, axis=2) > 0.6
+    snug = np.mean(seen[:, :, :2] == FREE, axis=2)
+    return Sides(np.asarray(near, np.float64), np.asarray(snug, np.float64), np.asarray(water, np.bool_))
 
 
 def capped(end: End, state: NDArray[np.uint8]) -> bool:
-    """Whether the wall was seen to end: free water across the whole of its end face."""
-    across = np.arange(-end.half, end.half + 0.6, 0.5)
-    for ahead in (1.0, 1.8):
-        x = end.x + end.dx * ahead - end.dy * across
-        y = end.y + end.dy * ahead + end.dx * across
-        if np.all(at(state, x, y) == FREE):
-            return True
-    return False
+    """Whether the wall was seen to end: nothing unknown lies close before its end face."""
+    x, y = end.x + _FAN[0] * end.dx - _FAN[1] * end.dy, end.y + _FAN[0] * end.dy + _FAN[1] * end.dx
+    return not bool(np.any(at(state, x, y) == UNKNOWN))

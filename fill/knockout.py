@@ -28,18 +28,23 @@ Cell = tuple[int, int]
 
 @dataclass(frozen=True, slots=True)
 class Exam:
-    """A grid with pieces taken out: ``state`` as the filler will see it, ``zone`` the cells about the pieces."""
+    """A grid with ``holes`` pieces taken out.
+
+    ``state`` is what the filler will see, ``zone`` the cells about the pieces, ``rim`` the pieces and what touches
+    them, where a fill of theirs must begin or end.
+    """
 
     state: NDArray[np.uint8]
     zone: NDArray[np.bool_]
+    rim: NDArray[np.bool_]
     holes: int
 
 
 def knock_out(state: NDArray[np.uint8], walls: Walls, longest: float, count: int, random: np.random.Generator) -> Exam:
-    """Take up to ``count`` pieces out of the walls, and the water out of up to half as many openings."""
+    """Take up to ``count`` pieces out of the walls, and the water out of up to a quarter as many openings."""
     seen = state.copy()
     zone = np.zeros(state.shape, bool)
-    for first, second in _openings(walls, state, longest, count // 2, random):
+    for first, second in _openings(walls, state, longest, count // 4, random):
         _blank_opening(first, second, seen, zone, state, random)
     holes = 0
     starts = np.argwhere(walls.centre)
@@ -52,7 +57,8 @@ def knock_out(state: NDArray[np.uint8], walls: Walls, longest: float, count: int
         if path is not None and not _near(path, zone):
             _erase(path, walls, seen, zone, random)
             holes += 1
-    return Exam(seen, zone, holes)
+    rim = ndimage.binary_dilation(seen != state, EIGHT, iterations=2)
+    return Exam(seen, zone, np.asarray(rim, np.bool_), holes)
 
 
 def _piece(start: Cell, centre: NDArray[np.bool_], length: int) -> list[Cell] | None:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from fill.candidates import Candidate, across, onto_side
+from fill.candidates import Candidate, across, dry, onto_side, opening
 from fill.segments import Walls
 
 _PARTNERS: Final = 6  # candidates of an end that are worth drawing
@@ -27,11 +27,11 @@ def candidates(walls: Walls, state: NDArray[np.uint8], longest: float) -> list[C
     found = []
     for first, second in _pairs(walls, longest):
         candidate = across(first, second, walls, state)
-        if candidate is not None:
+        if candidate is not None and not opening(candidate) and not dry(candidate):
             found.append(candidate)
     for index in range(len(walls.ends)):
         candidate = onto_side(index, walls, state, longest)
-        if candidate is not None:
+        if candidate is not None and not opening(candidate) and not dry(candidate):
             found.append(candidate)
     return found
 

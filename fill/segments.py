@@ -10,6 +10,7 @@ Coordinates here are cells: x is the column, y the row, whole numbers at cell ce
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -18,10 +19,11 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from skimage.morphology import skeletonize
 
-STEPS: Final = ((-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1))
+STEPS: Final = ((-1, 0), (0, -1), (0, 1), (1, 0), (-1, -1), (-1, 1), (1, -1), (1, 1))
 EIGHT: Final = np.ones((3, 3), np.int8)
 SUPPORT: Final = 14
 """How many cells of centre line behind an end tell its direction."""
+_WEIGHTS: Final = np.linspace(1.0, 0.4, SUPPORT + 1)  # the nearest part of a wall tells most about its direction
 _SPUR_ROUNDS: Final = 2
 _SOLID: Final = 8.0  # cells from the nearest water: deeper is not wall but the ground behind it
 
@@ -71,74 +73,85 @@ def find_walls(mask: NDArray[np.bool_]) -> Walls:
     wall = half > 0
     label = np.zeros(wall.shape, np.int32)
     ndimage.label(wall, EIGHT, output=label)
-    centre = np.asarray(skeletonize(wall), np.bool_)  # type: ignore[no-untyped-call]
-    _prune(centre, half)
-    ends = [_end(at, centre, half, label) for at in _tips(centre)]
+    lines = CentreLines(np.asarray(skeletonize(wall), np.bool_))  # type: ignore[no-untyped-call]
+    lines.prune(half)
     inner = slice(1, -1), slice(1, -1)
-    kept = tuple(end for end in ends if end is not None)
-    return Walls(wall[inner], label[inner], half[inner], centre[inner], kept)
+    kept = tuple(end for end in (_end(at, lines, half, label) for at in lines.tips()) if end is not None)
+    return Walls(wall[inner], label[inner], half[inner], lines.mask()[inner], kept)
 
 
-def _tips(centre: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Cells of the centre lines with one neighbour or none."""
-    around = ndimage.convolve(centre.astype(np.int8), EIGHT, mode="constant") - 1
-    return [(int(row), int(col)) for row, col in np.argwhere(centre & (around <= 1))]
+class CentreLines:
+    """Centre lines one cell wide, as a set of cells numbered row by row, in a grid whose border is empty."""
+
+    def __init__(self, centre: NDArray[np.bool_]) -> None:
+        self._mask = centre.copy()
+        self._width = centre.shape[1]
+        self._steps = tuple(dr * self._width + dc for dr, dc in STEPS)
+        self._cells = set(np.flatnonzero(centre).tolist())
+
+    def mask(self) -> NDArray[np.bool_]:
+        """Return the lines as a layer."""
+        return self._mask
+
+    def tips(self) -> list[int]:
+        """Cells with one neighbour or none, in order."""
+        around = ndimage.correlate(self._mask.view(np.int8), EIGHT, mode="constant") - 1
+        return np.flatnonzero(self._mask & (around <= 1)).tolist()
+
+    def prune(self, half: NDArray[np.float32]) -> None:
+        """Remove spurs: branches that do not leave the thickness of the wall they stand on."""
+        thick = half.ravel()
+        longest = int(half.max(initial=0.0)) + 3
+        for _ in range(_SPUR_ROUNDS):
+            for at in self.tips():
+                path, branches = self.follow(at, longest)
+                if branches and len(path) <= thick[path[-1]] + 1.0:
+                    self._cells.difference_update(path[:-1])
+                    self._mask.flat[path[:-1]] = False
+
+    def follow(self, at: int, limit: int) -> tuple[list[int], bool]:
+        """Walk along a line from its tip: the cells passed, and whether the walk stopped at a branching."""
+        path, seen = [at], {at}
+        while len(path) < limit:
+            ahead = [cell for cell in self._around(path[-1]) if cell not in seen]
+            if not ahead:
+                return path, False
+            if len(ahead) > 1 and not self._touch(ahead):
+                return path, True
+            seen.update(ahead)
+            path.append(ahead[0])
+        return path, False
+
+    def places(self, path: list[int]) -> NDArray[np.float64]:
+        """Return x and y ``(n, 2)`` of cells, without the border."""
+        rows, cols = np.divmod(np.array(path), self._width)
+        return np.stack([cols, rows], axis=1) - 1.0
+
+    def _around(self, at: int) -> list[int]:
+        """Neighbours, straight ones first: of two side by side the diagonal one is not a branch."""
+        cells = self._cells
+        return [at + step for step in self._steps if at + step in cells]
+
+    def _touch(self, cells: list[int]) -> bool:
+        """Whether all of these neighbours touch the first: a bend of the line, not a branching."""
+        row, col = divmod(cells[0], self._width)
+        places = (divmod(cell, self._width) for cell in cells[1:])
+        return all(abs(other - row) <= 1 and abs(across - col) <= 1 for other, across in places)
 
 
-def _neighbours(at: tuple[int, int], centre: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    row, col = at
-    return [(row + dr, col + dc) for dr, dc in STEPS if centre[row + dr, col + dc]]
-
-
-def follow(at: tuple[int, int], centre: NDArray[np.bool_], limit: int) -> tuple[list[tuple[int, int]], bool]:
-    """Walk along a centre line from its tip: the cells passed, and whether the walk stopped at a branching."""
-    path, seen = [at], {at}
-    while len(path) < limit:
-        ahead = [cell for cell in _neighbours(path[-1], centre) if cell not in seen]
-        if not ahead:
-            return path, False
-        if len(ahead) > 1 and not _one_way(ahead):
-            return path, True
-        # Of two cells side by side the straight one comes first, so that the diagonal one is not a branch.
-        step = min(ahead, key=lambda cell: abs(cell[0] - path[-1][0]) + abs(cell[1] - path[-1][1]))
-        seen.update(ahead)
-        path.append(step)
-    return path, False
-
-
-def _one_way(cells: list[tuple[int, int]]) -> bool:
-    """Whether all of these neighbours touch each other: a bend of the line, not a branching."""
-    first = cells[0]
-    return all(max(abs(row - first[0]), abs(col - first[1])) <= 1 for row, col in cells[1:])
-
-
-def _prune(centre: NDArray[np.bool_], half: NDArray[np.float32]) -> None:
-    """Remove spurs, branches that do not leave the thickness of the wall they stand on, from ``centre`` itself."""
-    longest = int(half.max(initial=0.0)) + 3
-    for _ in range(_SPUR_ROUNDS):
-        for at in _tips(centre):
-            path, branches = follow(at, centre, longest)
-            if branches and len(path) <= float(half[path[-1]]) + 1.0:
-                rows, cols = zip(*path, strict=True)
-                centre[rows, cols] = False
-                centre[path[-1]] = True
-
-
-def _end(
-    at: tuple[int, int], centre: NDArray[np.bool_], half: NDArray[np.float32], label: NDArray[np.int32]
-) -> End | None:
-    path, _ = follow(at, centre, 2 * SUPPORT)
-    cells = np.array(path)
-    thick = float(np.median(half[cells[:, 0], cells[:, 1]])) - 0.5
+def _end(at: int, lines: CentreLines, half: NDArray[np.float32], label: NDArray[np.int32]) -> End | None:
+    path, _ = lines.follow(at, 2 * SUPPORT)
+    thick = float(np.sort(half.ravel()[path])[len(path) // 2]) - 0.5
     if len(path) < 3 or len(path) + thick < 2.5 * thick + 2.0:
         return None
-    line = smooth(cells[:, ::-1].astype(np.float64) - 1.0)
+    line = smooth(lines.places(path))
     middle, out, wander = direction(line[: SUPPORT + 1])
     tip = middle + out * float(np.dot(line[0] - middle, out))
     reach = _to_edge(tip + 1.0, out, half)
     x, y = tip + out * reach
-    length = float(np.hypot(*np.diff(line, axis=0).T).sum()) + reach
-    return End(float(x), float(y), float(out[0]), float(out[1]), thick, line, length, wander, int(label[at]))
+    steps = line[1:] - line[:-1]
+    length = float(np.hypot(steps[:, 0], steps[:, 1]).sum()) + reach
+    return End(float(x), float(y), float(out[0]), float(out[1]), thick, line, length, wander, int(label.flat[at]))
 
 
 def smooth(line: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -151,14 +164,15 @@ def smooth(line: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def direction(line: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
     """Middle, unit direction towards the first point, and mean distance of a line ``(n, 2)`` from straight."""
-    weight = np.linspace(1.0, 0.4, len(line))
-    middle = np.average(line, axis=0, weights=weight)
-    spread = (line - middle) * np.sqrt(weight)[:, None]
-    out = np.linalg.svd(spread, full_matrices=False)[2][0]
+    weight = _WEIGHTS[: len(line)]
+    middle = weight @ line / weight.sum()
+    off = line - middle
+    xx, xy, yy = weight @ (off[:, 0] ** 2), weight @ (off[:, 0] * off[:, 1]), weight @ (off[:, 1] ** 2)
+    turn = 0.5 * math.atan2(2.0 * xy, xx - yy)  # the major axis of the weighted points
+    out = np.array([math.cos(turn), math.sin(turn)])
     if np.dot(line[0] - line[-1], out) < 0:
         out = -out
-    normal = np.array([-out[1], out[0]])
-    return middle, out, float(np.abs((line - middle) @ normal).mean())
+    return middle, out, float(np.abs(off[:, 1] * out[0] - off[:, 0] * out[1]).mean())
 
 
 def _to_edge(tip: NDArray[np.float64], out: NDArray[np.float64], half: NDArray[np.float32]) -> float:
