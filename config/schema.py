@@ -117,7 +117,7 @@ class Feed(Section):
     surface_mbar: float | None = Field(
         None, ge=500, le=1200, description="absolute pressure at the surface; absent: 1013.25 until a tare"
     )
-    max_dive_m_s: float = Field(3.0, gt=0, le=100, description="faster dives are jumps of the depth or altitude")
+    max_dive_m_s: float = Field(3.0, gt=0, le=100, description="faster dives are jumps of the depth")
 
     checksum: Literal["require", "warn", "ignore"] = Field("require", description="nmea")
     dpt: Literal["vehicle_depth", "altitude"] = Field(

@@ -21,7 +21,8 @@ from drivers.quality import GOOD, JumpGate, Opinion, worst
 from drivers.readings import Altitude, Depth, Heading, Reading
 from drivers.statements import Message, Reader, Said, Statement
 
-_TURN_SLACK_DEG: Final = 5.0
+_TURN_SLACK_DEG: Final = 15.0
+"""Sentences that a network delivers together have one date, and a turning vehicle some degrees between them."""
 _DIVE_SLACK_M: Final = 0.5
 _LEAST_MBAR: Final = 500.0
 _DEEPEST_M: Final = 12_000.0

@@ -40,7 +40,8 @@ _QUANTITIES: Final[dict[type[Reading], Quantity]] = {Heading: "heading", Depth: 
 class Heard:
     """What one driver understood: of ``share`` of the bytes (0 to 1), in ``messages`` by name.
 
-    ``section`` and ``settings`` are the lines of the configuration that it gives, ``says`` is for people.
+    ``section`` and ``settings`` are the lines of the configuration that it gives; ``says`` is for people, and
+    ``advice`` what they alone can know.
     """
 
     driver: str
@@ -49,6 +50,7 @@ class Heard:
     messages: dict[str, int]
     share: float
     settings: dict[str, Json] = field(default_factory=dict)
+    advice: str = ""
 
 
 def identify(pieces: Pieces) -> list[Heard]:
@@ -97,7 +99,8 @@ def _feed(feed: Feed, pieces: Pieces, size: int) -> Heard | None:
     if feed.format == "keller":
         settings["format"] = "keller"
     settings["provides"] = [each for each in _QUANTITIES.values() if each in told]
-    return Heard(feed.driver, "feed", _described(reader), dict(counters.frames), share, settings)
+    says, advice = _described(reader), _advice(feed, reader)
+    return Heard(feed.driver, "feed", says, dict(counters.frames), share, settings, advice)
 
 
 def _described(reader: Reader) -> str:
@@ -108,10 +111,22 @@ def _described(reader: Reader) -> str:
         case MavlinkReader():
             return f"MAVLink, {reader.speaker or 'a vehicle'}"
         case Pro3Reader():
-            return f"VideoRay Pro 3; its depth sensor's count is {reader.count}"
+            return "VideoRay Pro 3"
         case Pro4Reader():
             return "VideoRay Pro 4"
         case KellerReader():
             return "Keller pressure sensor"
         case _:
-            return "numbers in lines of text; set column and unit"
+            return "numbers in lines of text"
+
+
+def _advice(feed: Feed, reader: Reader) -> str:
+    match reader:
+        case NmeaReader() if {"DPT", "DBT", "DBK"} & set(reader.counters.frames):
+            return 'dpt = "altitude" if these depths are the water below the vehicle'
+        case Pro3Reader():
+            return f"for depths, set depth_points; the depth sensor's count is {reader.count} now"
+        case MavlinkReader() | Pro4Reader() | KellerReader():
+            return "depths need the pressure at the surface: set surface_mbar, or take a tare there"
+        case _:
+            return "set column and unit" if feed.driver == "pressure" else ""

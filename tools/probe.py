@@ -88,7 +88,8 @@ def toml(url: str, baud: int, heard: Heard) -> str:
     """Return the lines of the configuration for what was heard."""
     settings: dict[str, Any] = {"port": _staying_name(url), "baud": baud} | heard.settings
     head = "[sonar]" if heard.section == "sonar" else "[[feed]]"
-    return "\n".join([head, *(f"{key} = {json.dumps(value)}" for key, value in settings.items())])
+    advice = [f"# {heard.advice}"] if heard.advice else []
+    return "\n".join([head, *(f"{key} = {json.dumps(value)}" for key, value in settings.items()), *advice])
 
 
 def _listen(url: str, baud: int, seconds: float, question: bytes) -> Listening:

@@ -74,6 +74,14 @@ def test_recorded_bytes_are_known_for_what_they_are(
         assert best.share > 0.6
 
 
+def test_what_only_people_know_is_asked_of_them(shared_data: Path) -> None:
+    advice = {each[1]: identify([(0, each[0](shared_data))])[0].advice for each in RECORDED[1:]}
+    assert advice["nmea"].startswith('dpt = "altitude" if')
+    assert advice["videoray_pro3"].endswith("count is 500 now")
+    assert "tare" in advice["mavlink"]
+    assert advice["pressure"] == "set column and unit"
+
+
 def test_a_line_at_a_wrong_baud_rate_is_nobody(shared_data: Path) -> None:
     # What a receiver at twice the rate makes of the bits: each seen twice.
     data = feeds("gpsd_bundg_zeus_9_filtered.nmea")(shared_data)
