@@ -94,4 +94,6 @@ def _compared(told: dict[str, Any], facts: dict[str, Json]) -> dict[str, Json]:
 def _line(event: dict[str, Any]) -> str:
     if event["event"] == "station":
         return f"{event['t_s']:8.1f} s  at rest at station {event['station'] + 1} of {event['of']}"
+    if event["event"] == "fault":
+        return f"{event['t_s']:8.1f} s  fault: {event['kind']} ({event['port'] or 'clock'})"
     return f"{event.get('t_s', 0.0):8.1f} s  {event['event']}"

@@ -8,14 +8,15 @@ import signal
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import FrameType
 
 from config.errors import LogError, UsageError
 from drivers.records import Json
-from tools.emulator import options
+from tools.emulator import faults, options
 from tools.emulator.dive import Dive, DiveOptions
+from tools.emulator.head import HeadOptions
 from tools.emulator.record import record, write_jsonl
 from tools.emulator.serve import SPEEDS, Emulation
 from tools.emulator.site import SITES
@@ -24,7 +25,12 @@ from tools.emulator.truth import truth_of
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = faults.__doc__
     options.add_arguments(parser)
+    parser.add_argument("--head", choices=("dst", "non-dst"), default="dst", help="family of the head (default: dst)")
+    parser.add_argument("--half-duplex", action="store_true", help="both sides on one wire, one ping a request")
+    parser.add_argument("--aux-hz", type=float, default=0.0, metavar="N", help="an echosounder on the head speaks")
     parser.add_argument("--speed", type=float, default=1.0, metavar="N", help="times real time (default: 1)")
     parser.add_argument("--folder", type=Path, metavar="DIR", help="where the ports' names go (default: a new folder)")
     parser.add_argument("--truth", type=Path, metavar="FILE", help="write where everything truly was (JSON)")
@@ -36,7 +42,10 @@ def run(args: argparse.Namespace) -> int:
     """Serve until Ctrl-C or SIGTERM, or record."""
     if not SPEEDS[0] <= args.speed <= SPEEDS[1]:
         raise UsageError(f"--speed must be from {SPEEDS[0]:g} to {SPEEDS[1]:g}")
-    chosen = options.dive_options(args)
+    if not 0.0 <= args.aux_hz <= 20.0:
+        raise UsageError("--aux-hz must be from 0 to 20")
+    head = HeadOptions(dst=args.head == "dst", replies_per_request=1 if args.half_duplex else 2, aux_hz=args.aux_hz)
+    chosen = replace(options.dive_options(args), head=head)
     return _record(args, chosen) if args.record else _serve(args, chosen)
 
 
@@ -102,6 +111,8 @@ def _tell(event: dict[str, Json]) -> None:
             _say(f"sonar {event['sonar']}\nfeed  {event['feed']}\nwaiting for a host; Ctrl-C ends")
         case "station":
             _say(f"{event['t_s']:8.1f} s  at rest at station {event['station']} of {event['of']} (counted from 0)")
+        case "fault":
+            _say(f"{event['t_s']:8.1f} s  fault: {event['kind']} ({event['port'] or 'clock'})")
         case _:
             _say(f"{event['t_s']:8.1f} s  done; staying at rest, Ctrl-C ends")
 

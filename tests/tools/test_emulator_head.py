@@ -32,7 +32,7 @@ from drivers.tritech.headdata import Control, HeadData, echoes_of
 from drivers.tritech.messages import Alive, BBUserData, HeadInf, Message, VersionData, decode
 from drivers.tritech.settings import head_command
 from tools.emulator.head import Head, HeadOptions, Sounding
-from tools.emulator.sweep import Sweep
+from tools.emulator.sweep import DstSweep
 
 MS = 1_000_000
 PARAMETERS = head_command(Sonar()).parameters
@@ -184,7 +184,7 @@ def test_sector_sweeps_as_a_real_head_did(shared_data: Path) -> None:
         real = list(csv.DictReader(file))
     wanted = [(int(row["bearing"]), int(row["sweep_code"]), bool(int(row["hdctrl"]) & 4)) for row in real]
     parameters = replace(PARAMETERS, control=Control(0x2309), left_limit=1778, right_limit=4622, step=32)
-    sweep = Sweep()
+    sweep = DstSweep()
     sweep.bearing = wanted[0][0]
     sweep.limit(parameters)
     beams = [sweep.next(parameters) for _ in wanted]

@@ -161,6 +161,6 @@ def test_port_is_raw_and_forgets_what_nobody_reads(tmp_path: Path) -> None:
         os.close(handle)
         assert port.read() == b""
     finally:
-        port.close()
-    port.close()
+        port.unplug()
+    port.unplug()
     assert not (tmp_path / "sonar").is_symlink()

@@ -9,10 +9,16 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.tritech.headdata import HeadStatus
 from drivers.tritech.units import TURN
 from tools.emulator.echoes import EchoModel, Place, Sampling
+from tools.emulator.faults.calendar import Calendar, Spell
+from tools.emulator.faults.line import FaultyLine
+from tools.emulator.faults.script import Fault, Port
+from tools.emulator.faults.senses import Senses
 from tools.emulator.feeds import FeedOptions, NmeaFeed
 from tools.emulator.head import Head, HeadOptions, Sounding
+from tools.emulator.line import Line
 from tools.emulator.site import Site
 from tools.emulator.vehicle import Rest, Vehicle, VehicleOptions
 
@@ -25,7 +31,7 @@ class DiveOptions:
     """What may differ from dive to dive.
 
     ``stations`` limits the stops; ``sound_speed_m_s`` is the water's own.  ``mount_rad`` is the head's ahead,
-    clockwise from the bow; a head that hangs upside down turns the other way.
+    clockwise from the bow; a head that hangs upside down turns the other way.  ``faults`` come by the dive's seed.
     """
 
     stations: int | None = None
@@ -35,6 +41,7 @@ class DiveOptions:
     head: HeadOptions = field(default_factory=HeadOptions)
     feed: FeedOptions = field(default_factory=FeedOptions)
     vehicle: VehicleOptions = field(default_factory=VehicleOptions)
+    faults: tuple[Fault, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,9 +65,15 @@ class Dive:
         self.track: list[Track] = []
         rng = np.random.default_rng((seed, 0xD1FE))
         self.vehicle = Vehicle(self.site.stops, self.options.vehicle, phase=float(rng.uniform(0.0, tau)))
-        self.head = Head(self._listen, self.options.head)
+        self.calendar = Calendar(self.options.faults, seed)
+        self.spells: list[Spell] = []
+        bauds: dict[Port, int] = {"sonar": self.options.head.baud, "feed": self.options.feed.baud}
+        self._lines = {port: FaultyLine(Line(baud), seed + baud) for port, baud in bauds.items()}
+        self._senses = Senses(self.vehicle.place_at)
+        self.head = Head(self._listen, self.options.head, 0, self._lines["sonar"], self._echosounder)
         self._echoes = EchoModel(self.site, seed)
-        self._feed = NmeaFeed(self.vehicle.place_at, rng, self.options.feed)
+        senses = self._senses
+        self._feed = NmeaFeed(senses.place_at, rng, self.options.feed, self._lines["feed"], senses.is_stuck)
         self._swept = 0.0
         self._next_track_ns = 0
 
@@ -83,10 +96,18 @@ class Dive:
 
     def push(self, t_ns: int, data: bytes) -> None:
         """Take bytes that the host sent to the sonar."""
-        self.head.push(t_ns, data)
+        self.calendar.start(t_ns)
+        self.head.push(t_ns, self._lines["sonar"].hear(t_ns, data))
+
+    def is_hung_up(self, port: Port, t_ns: int) -> bool:
+        """Whether a port is gone now, as if unplugged."""
+        return self._lines[port].is_hung_up(t_ns)
 
     def tick(self, t_ns: int) -> tuple[bytes, bytes]:
         """Move on to ``t_ns`` and return what the sonar's and the feed's lines have delivered since the last call."""
+        for spell in self.calendar.advance(t_ns):
+            self.spells.append(spell)
+            self._befall(t_ns, spell)
         sonar = self.head.tick(t_ns)
         feed = self._feed.tick(t_ns)
         if self.vehicle.started and t_ns >= self._next_track_ns:
@@ -109,3 +130,21 @@ class Dive:
         sampling = Sampling(bin_m, sounding.bins, sounding.gain_db)
         turned = -sounding.bearing_rad if self.options.upside_down else sounding.bearing_rad
         return self._echoes.ping(place, self.options.mount_rad + turned, sampling, self.head.pings)
+
+    def _befall(self, t_ns: int, spell: Spell) -> None:
+        fault = spell.fault
+        match fault.kind:
+            case "power_cut":
+                self.head.cut_power(t_ns, spell.to_ns)
+            case "power_loss":
+                self.head.fail(HeadStatus.POWER_LOST)
+            case "motor_error":
+                self.head.fail(HeadStatus.MOTOR_ERROR, round(fault.turn_deg * TURN / 360.0))
+            case "stale" | "jump":
+                self._senses.begin(spell)
+            case _ if fault.befalls:
+                self._lines[fault.befalls].begin(t_ns, spell)
+
+    def _echosounder(self, t_ns: int) -> bytes:
+        """Return what an echosounder on the head's auxiliary port says: the height above the floor."""
+        return f"{max(0.0, self.site.floor_m - self.vehicle.place_at(t_ns).depth_m):.3f}m\r\n".encode()

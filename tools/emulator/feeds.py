@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from tools.emulator.echoes import Place
-from tools.emulator.line import Line
+from tools.emulator.line import Line, Wire
 
 SECOND_NS = 1_000_000_000
 
@@ -38,11 +38,21 @@ class FeedOptions:
 class NmeaFeed:
     """Sentences of a compass (HDG or HDM) and a depth sensor (DPT: the vehicle's depth), paced by their line."""
 
-    def __init__(self, where: Callable[[int], Place], rng: np.random.Generator, options: FeedOptions) -> None:
+    def __init__(
+        self,
+        where: Callable[[int], Place],
+        rng: np.random.Generator,
+        options: FeedOptions,
+        line: Wire | None = None,
+        is_stuck: Callable[[int], bool] = lambda _: False,
+    ) -> None:
+        """Sense ``where`` the vehicle is; while ``is_stuck`` the last sentences are said again."""
         self._where = where
         self._rng = rng
         self._options = options
-        self._line = Line(options.baud)
+        self._line = line or Line(options.baud)
+        self._is_stuck = is_stuck
+        self._said: dict[str, bytes] = {}
         self._next_heading_ns = 0
         self._next_depth_ns = int(SECOND_NS / options.heading_hz / 2)
 
@@ -50,11 +60,17 @@ class NmeaFeed:
         """Return the bytes that have come by ``t_ns`` since the last call."""
         if t_ns >= self._next_heading_ns:
             self._next_heading_ns = t_ns + int(SECOND_NS / self._options.heading_hz)
-            self._line.send(t_ns, self._heading(self._where(t_ns).heading_rad))
+            self._say(t_ns, "heading")
         if t_ns >= self._next_depth_ns:
             self._next_depth_ns = t_ns + int(SECOND_NS / self._options.depth_hz)
-            self._line.send(t_ns, self._depth(self._where(t_ns).depth_m))
+            self._say(t_ns, "depth")
         return self._line.take(t_ns)
+
+    def _say(self, t_ns: int, what: Literal["heading", "depth"]) -> None:
+        if what not in self._said or not self._is_stuck(t_ns):
+            place = self._where(t_ns)
+            self._said[what] = self._heading(place.heading_rad) if what == "heading" else self._depth(place.depth_m)
+        self._line.send(t_ns, self._said[what])
 
     def _heading(self, heading_rad: float) -> bytes:
         options = self._options

@@ -5,10 +5,12 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 from math import isfinite
+from pathlib import Path
 from typing import Final
 
 from config.errors import UsageError
 from tools.emulator.dive import DiveOptions
+from tools.emulator.faults import read_faults
 from tools.emulator.feeds import FeedOptions
 from tools.emulator.site import SITES
 from tools.emulator.vehicle import PILOTS
@@ -39,10 +41,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="A",
         help="greatest error of the compass that goes with the heading (default: 1.5)",
     )
+    parser.add_argument(
+        "--faults", type=Path, metavar="FILE", help="what goes wrong, and when: see `lacuna emulate -h`"
+    )
 
 
 def dive_options(args: argparse.Namespace) -> DiveOptions:
-    """Return the options of the dive; raises UsageError where they make no sense."""
+    """Return the options of the dive; raises UsageError where they make no sense, and what `read_faults` raises."""
     if args.stations is not None and args.stations < 1:
         raise UsageError("--stations must be 1 or more")
     if args.seed < 0:
@@ -56,6 +61,7 @@ def dive_options(args: argparse.Namespace) -> DiveOptions:
         stations=args.stations,
         feed=FeedOptions(bias_deg=args.bias_deg, deviation_deg=args.deviation_deg),
         vehicle=replace(PILOTS[args.pilot], drift_m_s=args.drift_m_s),
+        faults=read_faults(args.faults) if args.faults else (),
     )
 
 
@@ -63,4 +69,5 @@ def words(args: argparse.Namespace) -> list[str]:
     """Return the words that give another command the same options."""
     said = ["--site", args.site, "--seed", str(args.seed), "--pilot", args.pilot]
     said += [f"--{name.replace('_', '-')}={getattr(args, name)}" for name in _LIMITS]
-    return said if args.stations is None else [*said, "--stations", str(args.stations)]
+    said += [] if args.stations is None else ["--stations", str(args.stations)]
+    return said if args.faults is None else [*said, "--faults", str(args.faults)]

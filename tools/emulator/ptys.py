@@ -28,17 +28,37 @@ class PtyPort:
     def __init__(self, link: Path) -> None:
         """Open the pair and name the host's side ``link``; raises InputError where the link cannot be made."""
         self.link = link
+        self._device = self._host = -1
+        self._waiting = bytearray()
+        self._handed_ns = 0
+        self.plug_in()
+
+    @property
+    def is_there(self) -> bool:
+        """Whether the port can be opened, read and written."""
+        return self._device >= 0
+
+    def plug_in(self) -> None:
+        """Open a new pair under the old name; raises InputError where the link cannot be made."""
+        if self.is_there:
+            return
         self._device, self._host = pty.openpty()
         # The host's side stays open here as well: its raw mode would be reset at the last close.
         tty.setraw(self._host, termios.TCSANOW)
         os.set_blocking(self._device, False)
-        self._waiting = bytearray()
-        self._handed_ns = 0
         try:
-            _link(link, os.ttyname(self._host))
+            _link(self.link, os.ttyname(self._host))
         except OSError as error:
             self._close_pair()
-            raise InputError(f"cannot make {link}: {error.strerror}; choose another folder") from None
+            raise InputError(f"cannot make {self.link}: {error.strerror}; choose another folder") from None
+
+    def unplug(self) -> None:
+        """Hang up on the host and take the name away; harmless when repeated."""
+        if self.is_there:
+            if self.link.is_symlink() and self.link.readlink() == Path(os.ttyname(self._host)):
+                self.link.unlink()
+            self._close_pair()
+            self._waiting.clear()
 
     def fileno(self) -> int:
         """File descriptor to wait on."""
@@ -46,6 +66,8 @@ class PtyPort:
 
     def read(self) -> bytes:
         """Return what the host has sent, possibly nothing."""
+        if not self.is_there:
+            return b""
         try:
             return os.read(self._device, 65536)
         except BlockingIOError:
@@ -53,6 +75,8 @@ class PtyPort:
 
     def write(self, now_ns: int, data: bytes) -> None:
         """Hand bytes to the host; ``now_ns`` is real time, to tell a slow host from none."""
+        if not self.is_there:
+            return
         if not self._waiting:
             self._handed_ns = now_ns
         self._waiting += data
@@ -61,13 +85,6 @@ class PtyPort:
         if self._waiting and (now_ns - self._handed_ns > _DEAF_NS or len(self._waiting) > _MOST_WAITING):
             self._waiting.clear()
             termios.tcflush(self._host, termios.TCIFLUSH)
-
-    def close(self) -> None:
-        """Remove the name and close the pair; harmless when repeated."""
-        if self._device >= 0:
-            if self.link.is_symlink() and self.link.readlink() == Path(os.ttyname(self._host)):
-                self.link.unlink()
-            self._close_pair()
 
     def _hand_over(self) -> int:
         # Beyond what the terminal itself holds, the kernel keeps bytes where a flush does not find them.
@@ -89,7 +106,7 @@ class PtyPort:
     def _close_pair(self) -> None:
         os.close(self._device)
         os.close(self._host)
-        self._device = -1
+        self._device = self._host = -1
 
 
 class FolderLock:

@@ -14,9 +14,10 @@ from typing import Final
 
 from drivers.records import Json
 from tools.emulator.dive import Dive, DiveOptions
+from tools.emulator.faults.script import Port
 from tools.emulator.ptys import FolderLock, PtyPort
 from tools.emulator.site import SITES
-from tools.emulator.truth import truth_of
+from tools.emulator.truth import told, truth_of
 
 SECOND_NS: Final = 1_000_000_000
 SPEEDS: Final = (0.1, 50.0)
@@ -50,7 +51,8 @@ class Emulation:
     """Serves a dive: ``<folder>/sonar`` is the head, ``<folder>/feed`` compass and depth.
 
     Lines, pings, vehicle and sensors all run ``speed`` times as fast as real ones.  ``tell`` gets what happens:
-    ``ready`` with the ports, ``station`` at each rest, ``done`` after the last one, where the vehicle stays.
+    ``ready`` with the ports, ``station`` at each rest, ``done`` after the last one, where the vehicle stays, and
+    ``fault`` when something goes wrong by the dive's script.
     """
 
     def __init__(
@@ -71,9 +73,11 @@ class Emulation:
         with ExitStack() as undo:
             undo.callback(self._lock.release)
             self.sonar = PtyPort(folder / "sonar")
-            undo.callback(self.sonar.close)
+            undo.callback(self.sonar.unplug)
             self.feed = PtyPort(folder / "feed")
             undo.pop_all()
+        self._ports: dict[Port, PtyPort] = {"sonar": self.sonar, "feed": self.feed}
+        self._told_spells = 0
 
     def truth(self) -> dict[str, Json]:
         """Return where everything truly is and was (see ``truth_of``)."""
@@ -84,14 +88,14 @@ class Emulation:
         self._tell({"event": "ready", "sonar": str(self.sonar.link), "feed": str(self.feed.link)})
         clock = _Clock(self._speed, time.monotonic_ns())
         while not stop():
-            select.select([self.sonar, self.feed], [], [], self._wait_s)
+            select.select([port for port in self._ports.values() if port.is_there], [], [], self._wait_s)
             clock = clock.at(time.monotonic_ns())
             self._round(clock)
 
     def close(self) -> None:
         """Close the ports, remove their names and let the folder go."""
-        self.sonar.close()
-        self.feed.close()
+        self.sonar.unplug()
+        self.feed.unplug()
         self._lock.release()
 
     def _round(self, clock: _Clock) -> None:
@@ -99,10 +103,21 @@ class Emulation:
             self.dive.push(clock.t_ns, asked)
         self.feed.read()  # nothing listens at the sensors' end
         from_sonar, from_feed = self.dive.tick(clock.t_ns)
+        self._hang_up(clock.t_ns)
         self.sonar.write(clock.real_ns, from_sonar)
         self.feed.write(clock.real_ns, from_feed)
         if self.dive.advance(clock.t_ns):
             self._report(clock.t_ns)
+
+    def _hang_up(self, t_ns: int) -> None:
+        for name, port in self._ports.items():
+            if self.dive.is_hung_up(name, t_ns):
+                port.unplug()
+            else:
+                port.plug_in()
+        for spell in self.dive.spells[self._told_spells :]:
+            self._told_spells += 1
+            self._tell({"event": "fault", "t_s": round(t_ns / SECOND_NS, 3), **told(spell)})
 
     def _report(self, t_ns: int) -> None:
         t_s = round(t_ns / SECOND_NS, 3)

@@ -1,4 +1,4 @@
-"""How a DST head's transducer turns: round and round, or to and fro between two limits.
+"""How a head's transducer turns: round and round, or to and fro between two limits.
 
 Angles in 1/16 gradian: 6400 to the turn, 3200 ahead, growing clockwise.
 """
@@ -6,7 +6,7 @@ Angles in 1/16 gradian: 6400 to the turn, 3200 ahead, growing clockwise.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Protocol
 
 from drivers.tritech.commands import HeadParameters
 from drivers.tritech.headdata import Control
@@ -27,8 +27,26 @@ class Beam:
     sweep: int
 
 
-class Sweep:
+class Sweep(Protocol):
     """The motor's place and direction."""
+
+    bearing: int
+
+    def centre(self) -> None:
+        """Turn ahead, as after power came."""
+
+    def reverse(self) -> None:
+        """Turn the other way from here."""
+
+    def limit(self, settings: HeadParameters) -> None:
+        """Obey new settings."""
+
+    def next(self, settings: HeadParameters) -> Beam:
+        """Step once and return the beam there."""
+
+
+class DstSweep:
+    """A DST head's sweep."""
 
     def __init__(self) -> None:
         self.bearing = AHEAD
@@ -87,6 +105,61 @@ class Sweep:
             self.clockwise = True
             return Beam(self.bearing, self.clockwise, AT_LEFT)
         return Beam(self.bearing, self.clockwise, NORMAL)
+
+
+class OldSweep:
+    """The sweep of a head that is not DST, as recorded from a SeaKing.
+
+    Bearings are multiples of the step, so that the outermost ones may lie a step outside the left limit; a beam at an
+    end is made twice, once for each direction; the sweep code is never told.
+    """
+
+    def __init__(self) -> None:
+        self.bearing = AHEAD
+        self.clockwise = True
+        self._fresh = True
+
+    def centre(self) -> None:
+        """Turn ahead, as after power came."""
+        self.bearing, self.clockwise, self._fresh = AHEAD, True, True
+
+    def reverse(self) -> None:
+        """Turn the other way from here."""
+        self.clockwise = not self.clockwise
+
+    def limit(self, settings: HeadParameters) -> None:
+        """Obey new settings, the direction among them; a transducer outside a sector goes to its left end."""
+        self.clockwise = bool(settings.control & Control.SCAN_RIGHT)
+        self.bearing = self.bearing // settings.step * settings.step
+        self._fresh = True
+        first, span = _ends(settings)
+        if not settings.control & Control.CONTINUOUS and (self.bearing - first) % TURN > span:
+            self.bearing, self.clockwise = first, True
+
+    def next(self, settings: HeadParameters) -> Beam:
+        """Step once and return the beam there; an end is answered where it stands before the way back begins."""
+        if settings.control & Control.STARE:
+            self.bearing = settings.left_limit
+        elif self._fresh:
+            self._fresh = False
+        elif settings.control & Control.CONTINUOUS:
+            self.bearing = (self.bearing + (settings.step if self.clockwise else -settings.step)) % TURN
+        else:
+            first, span = _ends(settings)
+            place = (self.bearing - first) % TURN + (settings.step if self.clockwise else -settings.step)
+            if 0 <= place <= span:
+                self.bearing = (first + place) % TURN
+            else:
+                self.clockwise = not self.clockwise
+        return Beam(self.bearing, self.clockwise, NORMAL)
+
+
+def _ends(settings: HeadParameters) -> tuple[int, int]:
+    """Return the first bearing of an old head's sector and how far it is to the last, both whole steps."""
+    step = settings.step
+    first = settings.left_limit // step * step
+    span = (settings.right_limit - settings.left_limit) % TURN + settings.left_limit - first
+    return first, span // step * step
 
 
 def _inside(bearing: int, settings: HeadParameters) -> bool:

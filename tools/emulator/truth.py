@@ -7,6 +7,7 @@ from math import degrees
 from drivers.records import Json
 from tools.emulator.dive import Dive
 from tools.emulator.echoes import Place
+from tools.emulator.faults.calendar import NEVER_NS, Spell
 from tools.emulator.vehicle import Rest
 
 
@@ -31,6 +32,7 @@ def truth_of(dive: Dive) -> dict[str, Json]:
         "plan_depth_m": dive.site.plan_depth_m,
         "sound_speed_m_s": dive.options.sound_speed_m_s,
         "compass": {"bias_deg": feed.bias_deg, "deviation_deg": feed.deviation_deg, "sd_deg": feed.heading_sd_deg},
+        "faults": [_fault(spell) for spell in dive.spells],
         "done": dive.done,
         "stations": [_station(dive, rest) for rest in dive.vehicle.rests],
         "trajectory": [[each.t_ns, *_row(each.place)] for each in dive.track],
@@ -49,6 +51,18 @@ def _station(dive: Dive, rest: Rest) -> dict[str, Json]:
         "rest_from_ns": rest.from_ns,
         "rest_to_ns": rest.to_ns,
     }
+
+
+def told(spell: Spell) -> dict[str, Json]:
+    """Return a fault that has come as its script tells it, with the port that it befell."""
+    fault = spell.fault
+    words: dict[str, Json] = fault.model_dump(exclude_none=True, exclude_unset=True)
+    return {"kind": fault.kind, "port": fault.befalls, **words}
+
+
+def _fault(spell: Spell) -> dict[str, Json]:
+    ends: dict[str, Json] = {} if spell.to_ns >= NEVER_NS else {"to_ns": spell.to_ns}
+    return {**told(spell), "from_ns": spell.from_ns, **ends}
 
 
 def _row(place: Place) -> list[Json]:
