@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import Final
 
 from config.errors import UsageError
-from tools.bench import tank, truth
+from tools.bench import acquisition, tank, truth
 
 Row = dict[str, str | int | float]
 
-_BENCHES: Final = ("tank", "truth")
+_BENCHES: Final = ("tank", "truth", "acquisition")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -22,11 +23,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("benches", nargs="*", metavar="BENCH", help=f"which of {', '.join(_BENCHES)} (default: all)")
     parser.add_argument("--data", type=Path, default=Path("../shared/data"), metavar="DIR", help="real recordings")
     parser.add_argument("--seeds", type=int, default=2, metavar="N", help="emulated dives per site (default: 2)")
+    parser.add_argument("--quick", action="store_true", help="acquisition: a short run, for a first look")
     parser.add_argument("--json", action="store_true", help="print JSON lines")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Measure and print one line a case."""
+    """Measure and print one line a case; return 1 where a promise is broken."""
+    broken: list[str] = []
     if wrong := set(args.benches) - set(_BENCHES):
         raise UsageError(f"there is no bench {', '.join(sorted(wrong))}; choose of {', '.join(_BENCHES)}")
     for name in args.benches or _BENCHES:
@@ -35,11 +38,18 @@ def run(args: argparse.Namespace) -> int:
             continue
         for row in _measure(name, args):
             print(json.dumps({"bench": name} | row) if args.json else _line(name, row), flush=True)
-    return 0
+            broken += [str(row["figure"])] if row.get("holds") == "NO" else []
+    if broken:
+        print(f"broken promises: {'; '.join(broken)}", file=sys.stderr)
+    return 1 if broken else 0
 
 
 def _measure(name: str, args: argparse.Namespace) -> Iterator[Row]:
-    measures: dict[str, Callable[[argparse.Namespace], Iterator[Row]]] = {"tank": _tank, "truth": _truth}
+    measures: dict[str, Callable[[argparse.Namespace], Iterator[Row]]] = {
+        "tank": _tank,
+        "truth": _truth,
+        "acquisition": _acquisition,
+    }
     return measures[name](args)
 
 
@@ -51,6 +61,11 @@ def _tank(args: argparse.Namespace) -> Iterator[Row]:
 def _truth(args: argparse.Namespace) -> Iterator[Row]:
     for seed in range(1, args.seeds + 1):
         yield asdict(truth.measure("keyhole", seed))
+
+
+def _acquisition(args: argparse.Namespace) -> Iterator[Row]:
+    for figure in acquisition.measure(acquisition.QUICK if args.quick else acquisition.FULL):
+        yield figure.row()
 
 
 def _line(name: str, row: Row) -> str:

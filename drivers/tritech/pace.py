@@ -20,16 +20,19 @@ _BITS: Final = 10
 class Limits:
     """What a ping takes at least: ``sound_s`` to the last bin and back, ``line_s`` for its reply on the line.
 
-    A head samples the next ping while it sends the reply to the last one, so the longer of the two rules.
+    A head samples the next ping while it sends the reply to the last one, so the longer of the two rules; but where
+    ``takes_turns``, on a half-duplex line, it is asked for the next only when the last has come.
     """
 
     sound_s: float
     line_s: float
+    takes_turns: bool = False
 
     @property
     def ping_s(self) -> float:
         """Shortest time from ping to ping."""
-        return max(self.sound_s, self.line_s) + OVERHEAD_S
+        busy_s = self.sound_s + self.line_s if self.takes_turns else max(self.sound_s, self.line_s)
+        return busy_s + OVERHEAD_S
 
     def ruling(self, ping_s: float) -> str:
         """Name what rules where pings follow after ``ping_s``: ``line``, ``sound``, or ``other``.
@@ -41,9 +44,9 @@ class Limits:
         return "line" if self.line_s >= self.sound_s else "sound"
 
 
-def limits(bins: int, sampling_s: float, baud: int, bits: int = 8) -> Limits:
-    """Return the limits of pings of ``bins`` echoes of 8 or 4 ``bits``, sampled for ``sampling_s``."""
-    return Limits(sampling_s, (bins * bits // 8 + _FRAME_BYTES) * _BITS / baud)
+def limits(bins: int, sampling_s: float, baud: int, *, takes_turns: bool = False) -> Limits:
+    """Return the limits of pings of ``bins`` echoes of a byte each, sampled for ``sampling_s``."""
+    return Limits(sampling_s, (bins + _FRAME_BYTES) * _BITS / baud, takes_turns)
 
 
 class Pace:

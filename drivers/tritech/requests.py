@@ -72,7 +72,8 @@ class RequestLoop:
 
     def change(self, parameters: HeadParameters, baud: int) -> None:
         """Go on with other parameters: pings still owed may come, or be forgotten by the head, or come late."""
-        self.limits = limits(parameters.bins, parameters.bins * parameters.ad_interval * _TICK_S, baud)
+        sampling_s = parameters.bins * parameters.ad_interval * _TICK_S
+        self.limits = limits(parameters.bins, sampling_s, baud, takes_turns=self._is_half_duplex)
         slowest_s = max(self.limits.sound_s, self.limits.line_s)
         self._limit_ns = int((2 * slowest_s + _LATE_S) * 1e9)
         self._slow_start = self._is_excused = True

@@ -13,7 +13,7 @@ MS = 1_000_000
 
 def test_what_rules_a_ping() -> None:
     assert limits(400, 0.0135, 115200) == Limits(0.0135, 4450 / 115200)
-    assert limits(400, 0.0135, 115200, bits=4).line_s == pytest.approx(2450 / 115200)
+    assert limits(400, 0.0135, 115200, takes_turns=True).ping_s == pytest.approx(0.0135 + 4450 / 115200 + 0.01)
     line, sound = Limits(0.0135, 0.0386), Limits(0.101, 0.0386)
     assert line.ping_s == pytest.approx(0.0486, abs=1e-4)
     assert sound.ping_s == pytest.approx(0.111)
