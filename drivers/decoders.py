@@ -8,15 +8,15 @@ from typing import Final, Protocol
 from config.schema import Config, Feed, Site, Sonar
 from drivers.counters import Counters
 from drivers.feed import FeedDecoder
-from drivers.mavlink import MavlinkReader
+from drivers.mavlink import mavlink_reader
 from drivers.nmea import NmeaReader
 from drivers.pressure import pressure_reader
 from drivers.readings import Reading
 from drivers.records import Event
 from drivers.statements import Reader
 from drivers.tritech.decoder import TritechDecoder
-from drivers.videoray_pro3 import Pro3Reader
-from drivers.videoray_pro4 import Pro4Reader
+from drivers.videoray_pro3 import pro3_reader
+from drivers.videoray_pro4 import pro4_reader
 
 SONAR_PORT: Final = "sonar"
 """Name of the sonar's port; a feed's port has the feed's name."""
@@ -39,9 +39,9 @@ class Decoder(Protocol):
 SONARS: Final[dict[str, Callable[[Sonar], Decoder]]] = {"tritech": TritechDecoder}
 FEEDS: Final[dict[str, Callable[[Feed], Reader]]] = {
     "nmea": NmeaReader,
-    "mavlink": MavlinkReader,
-    "videoray_pro3": Pro3Reader,
-    "videoray_pro4": Pro4Reader,
+    "mavlink": mavlink_reader,
+    "videoray_pro3": pro3_reader,
+    "videoray_pro4": pro4_reader,
     "pressure": pressure_reader,
 }
 """By the ``driver`` of the configuration: who reads a line's bytes."""

@@ -19,7 +19,7 @@ from drivers.deviation import Deviation
 from drivers.hydrostatics import Surface, depth_m, surface_of
 from drivers.quality import GOOD, JumpGate, Opinion, worst
 from drivers.readings import Altitude, Depth, Heading, Reading
-from drivers.statements import Message, Reader, Said, Statement
+from drivers.statements import Meaning, Message, Reader, Statement
 
 _TURN_SLACK_DEG: Final = 15.0
 """Sentences that a network delivers together have one date, and a turning vehicle some degrees between them."""
@@ -81,14 +81,14 @@ class FeedDecoder:
 
     def _reading(self, t_ns: int, name: str, said: Statement) -> Reading | None:
         match said.what:
-            case Said.VARIATION:
+            case Meaning.VARIATION:
                 if self._feed.variation == "sentence":
                     self._variation_deg = said.value
-            case Said.FIELD:
+            case Meaning.FIELD:
                 self._field = self._field_opinion(said.value)
-            case Said.MAGNETIC | Said.TRUE:
+            case Meaning.MAGNETIC | Meaning.TRUE:
                 return self._heading(t_ns, name, said)
-            case Said.ABSOLUTE | Said.GAUGE | Said.PRESSURE:
+            case Meaning.ABSOLUTE | Meaning.GAUGE | Meaning.PRESSURE:
                 return self._depth_of_pressure(t_ns, name, said)
             case what if what in self._depths():
                 return self._depth(t_ns, name, said.value, _opinion(said))
@@ -102,7 +102,7 @@ class FeedDecoder:
         opinion = worst(_opinion(said), self._field)
         if opinion.quality != "bad":
             opinion = worst(opinion, self._turns.judge(name, t_ns, said.value))
-        told = "magnetic" if said.what is Said.MAGNETIC else "true"
+        told = "magnetic" if said.what is Meaning.MAGNETIC else "true"
         reference = told if self._feed.heading_reference == "as_said" else self._feed.heading_reference
         heading_deg = said.value - self._feed.mount_deg
         if reference == "magnetic":
@@ -114,7 +114,7 @@ class FeedDecoder:
         if "depth" not in self._feed.provides:
             return None
         opinion = _opinion(said)
-        if said.what is Said.GAUGE or (said.what is Said.PRESSURE and self._feed.pressure == "gauge"):
+        if said.what is Meaning.GAUGE or (said.what is Meaning.PRESSURE and self._feed.pressure == "gauge"):
             return self._depth(t_ns, name, depth_m(said.value, self._site), opinion)
         if said.value < _LEAST_MBAR:
             opinion = worst(opinion, Opinion("bad", f"{said.value:.0f} mbar is less than any air: no pressure sensor?"))
@@ -149,11 +149,11 @@ class FeedDecoder:
     def _source(self, name: str) -> str:
         return f"{self._feed.name}:{name}"
 
-    def _depths(self) -> tuple[Said, ...]:
-        return (Said.DEPTH, Said.BELOW_SURFACE) if self._feed.dpt == "vehicle_depth" else (Said.DEPTH,)
+    def _depths(self) -> tuple[Meaning, ...]:
+        return (Meaning.DEPTH, Meaning.BELOW_SURFACE) if self._feed.dpt == "vehicle_depth" else (Meaning.DEPTH,)
 
-    def _altitudes(self) -> tuple[Said, ...]:
-        return (Said.ALTITUDE, Said.ABOVE_FLOOR) if self._feed.dpt == "altitude" else (Said.ALTITUDE,)
+    def _altitudes(self) -> tuple[Meaning, ...]:
+        return (Meaning.ALTITUDE, Meaning.ABOVE_FLOOR) if self._feed.dpt == "altitude" else (Meaning.ALTITUDE,)
 
 
 def _opinion(said: Statement) -> Opinion:

@@ -14,16 +14,17 @@ from typing import Final
 from config.schema import Feed, Quantity, Site
 from drivers.decoders import FEEDS
 from drivers.feed import FeedDecoder
-from drivers.keller import KellerReader
-from drivers.mavlink import MavlinkReader
+from drivers.framed import FrameReader
+from drivers.keller import Keller
+from drivers.mavlink import Mavlink
 from drivers.nmea import NmeaReader
 from drivers.readings import Altitude, Depth, Heading, Reading
 from drivers.records import Json
 from drivers.statements import Reader
 from drivers.tritech.framing import Deframer
 from drivers.tritech.ids import HOST, name_of
-from drivers.videoray_pro3 import Pro3Reader
-from drivers.videoray_pro4 import Pro4Reader
+from drivers.videoray_pro3 import Pro3
+from drivers.videoray_pro4 import Pro4
 
 Pieces = Sequence[tuple[int, bytes]]
 
@@ -99,34 +100,35 @@ def _feed(feed: Feed, pieces: Pieces, size: int) -> Heard | None:
     if feed.format == "keller":
         settings["format"] = "keller"
     settings["provides"] = [each for each in _QUANTITIES.values() if each in told]
-    says, advice = _described(reader), _advice(feed, reader)
+    says, advice = _described(reader), _advice(reader)
     return Heard(feed.driver, "feed", says, dict(counters.frames), share, settings, advice)
 
 
 def _described(reader: Reader) -> str:
-    match reader:
+    match reader.interpreter if isinstance(reader, FrameReader) else reader:
         case NmeaReader():
             names = sorted(set(reader.counters.frames) - {"other", "encapsulated"})
             return f"NMEA 0183 ({', '.join(names) or 'nothing about heading or depth'})"
-        case MavlinkReader():
-            return f"MAVLink, {reader.speaker or 'a vehicle'}"
-        case Pro3Reader():
+        case Mavlink(speaker=speaker):
+            return f"MAVLink, {speaker or 'a vehicle'}"
+        case Pro3():
             return "VideoRay Pro 3"
-        case Pro4Reader():
+        case Pro4():
             return "VideoRay Pro 4"
-        case KellerReader():
+        case Keller():
             return "Keller pressure sensor"
         case _:
             return "numbers in lines of text"
 
 
-def _advice(feed: Feed, reader: Reader) -> str:
-    match reader:
-        case NmeaReader() if {"DPT", "DBT", "DBK"} & set(reader.counters.frames):
-            return 'dpt = "altitude" if these depths are the water below the vehicle'
-        case Pro3Reader():
-            return f"for depths, set depth_points; the depth sensor's count is {reader.count} now"
-        case MavlinkReader() | Pro4Reader() | KellerReader():
+def _advice(reader: Reader) -> str:
+    match reader.interpreter if isinstance(reader, FrameReader) else reader:
+        case NmeaReader():
+            is_below = {"DPT", "DBT", "DBK"} & set(reader.counters.frames)
+            return 'dpt = "altitude" if these depths are the water below the vehicle' if is_below else ""
+        case Pro3(count=count):
+            return f"for depths, set depth_points; the depth sensor's count is {count} now"
+        case Mavlink() | Pro4() | Keller():
             return "depths need the pressure at the surface: set surface_mbar, or take a tare there"
         case _:
-            return "set column and unit" if feed.driver == "pressure" else ""
+            return "set column and unit"

@@ -9,13 +9,13 @@ from __future__ import annotations
 import math
 import re
 import struct
-from collections import Counter
 from typing import Final
 
+from config.errors import FrameError
 from config.schema import Feed
-from drivers.counters import Counters
-from drivers.statements import Message, Said, Statement
-from drivers.wire import MORE, Cut, Cutter, byte_ns
+from drivers.framed import FrameReader, Said
+from drivers.statements import Meaning, Statement
+from drivers.wire import MORE, byte_ns
 
 _START: Final = re.compile(rb"[\x01-\xfa]")
 _READ: Final = 73
@@ -23,6 +23,8 @@ _REFUSED: Final = 0x80
 _REFUSAL_SIZE: Final = 5
 _SIZES: Final = {30: (5, 8), 48: (4, 10), 69: (4, 8), _READ: (5, 9), 74: (5, 9), 95: (5, 9)}
 """Sizes of requests and replies by function."""
+_ANY: Final = 250
+"""Address that any single sensor heeds."""
 _STANDARD_CHECK: Final = 0x80
 _MBAR_PER_BAR: Final = 1000.0
 
@@ -68,56 +70,43 @@ def judge(buffer: bytearray, at: int, _is_synced: bool) -> int | str:
     return ""
 
 
-class KellerReader:
-    """Pressures of the configured channel; which one a reply holds is known from the request before it, if heard."""
+class Keller:
+    """Pressures of the configured channel; which one a reply holds is known from the request before it, if heard.
+
+    Counted are ``reply``, ``request``, ``other`` and ``other_sensor`` (or channel); a refusal is ``exception_32`` where
+    the sensor was not initialised.
+    """
 
     def __init__(self, feed: Feed) -> None:
         self._address = feed.address
         self._channel = self._asked = feed.channel
-        self._cutter = Cutter(_START, judge, byte_ns(feed))
-        self._frames: Counter[str] = Counter()
-        self._bad: Counter[str] = Counter()
 
-    @property
-    def counters(self) -> Counters:
-        """What was seen so far; a refusal is ``exception_32`` where the sensor was not initialised."""
-        return Counters(dict(self._frames), self._cutter.skipped, dict(self._cutter.bad + self._bad))
-
-    def push(self, t_ns: int, data: bytes) -> list[Message]:
-        """Take bytes that arrived at ``t_ns`` and return the messages that they complete."""
-        return [message for cut in self._cutter.push(t_ns, data) for message in self._read(cut)]
-
-    def finish(self) -> list[Message]:
-        """End the stream."""
-        return [message for cut in self._cutter.finish() for message in self._read(cut)]
-
-    def _read(self, cut: Cut) -> list[Message]:
-        function, size = cut.data[1], len(cut.data)
+    def read(self, frame: bytes) -> Said:
+        """Return the name of a frame and what it says."""
+        function = frame[1]
         if function & _REFUSED:
-            self._bad[f"exception_{cut.data[2]}"] += 1
-        elif size == _SIZES[function][0]:
-            self._frames["request"] += 1
-            if function == _READ:
-                self._asked = cut.data[2]
-        elif function != _READ:
-            self._frames["other"] += 1
-        elif self._address not in (250, cut.data[0]) or self._asked != self._channel:
-            self._frames["other_sensor"] += 1
-        else:
-            self._frames["reply"] += 1
-            return self._reply(cut)
-        return []
+            raise FrameError(f"exception_{frame[2]}")
+        if len(frame) == _SIZES[function][0]:
+            self._asked = frame[2] if function == _READ else self._asked
+            return "request", ()
+        if function != _READ:
+            return "other", ()
+        if self._address not in (_ANY, frame[0]) or self._asked != self._channel:
+            return "other_sensor", ()
+        return "reply", (self._pressure(frame),)
 
-    def _reply(self, cut: Cut) -> list[Message]:
-        (bar,) = struct.unpack_from(">f", cut.data, 2)
-        status = cut.data[6]
+    def _pressure(self, frame: bytes) -> Statement:
+        (bar,) = struct.unpack_from(">f", frame, 2)
         if not math.isfinite(bar):
-            self._bad["field"] += 1
-            return []
+            raise FrameError("field")
+        mbar, status = bar * _MBAR_PER_BAR, frame[6]
         if status & 1 << self._channel:
-            said = Statement(Said.PRESSURE, bar * _MBAR_PER_BAR, "bad", "the sensor calls its channel invalid")
-        elif status & _STANDARD_CHECK:
-            said = Statement(Said.PRESSURE, bar * _MBAR_PER_BAR, "suspect", "the sensor's own check failed")
-        else:
-            said = Statement(Said.PRESSURE, bar * _MBAR_PER_BAR)
-        return [Message(cut.t_ns, "reply", (said,))]
+            return Statement(Meaning.PRESSURE, mbar, "bad", "the sensor calls its channel invalid")
+        if status & _STANDARD_CHECK:
+            return Statement(Meaning.PRESSURE, mbar, "suspect", "the sensor's own check failed")
+        return Statement(Meaning.PRESSURE, mbar)
+
+
+def keller_reader(feed: Feed) -> FrameReader:
+    """Return the reader of a Keller sensor's line."""
+    return FrameReader(_START, judge, Keller(feed), byte_ns(feed))

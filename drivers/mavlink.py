@@ -12,15 +12,15 @@ from __future__ import annotations
 import math
 import re
 import struct
-from collections import Counter
 from dataclasses import dataclass
 from typing import Final
 
+from config.errors import FrameError
 from config.schema import Feed
-from drivers.counters import Counters
+from drivers.framed import FrameReader, Said
 from drivers.readings import Quality
-from drivers.statements import Message, Said, Statement
-from drivers.wire import MORE, Cut, Cutter, byte_ns
+from drivers.statements import Meaning, Statement
+from drivers.wire import MORE, byte_ns
 
 _V1: Final = 0xFE
 _V2: Final = 0xFD
@@ -32,6 +32,7 @@ _AUTOPILOT: Final = 1
 
 _VEHICLES: Final = {2: "quadrotor", 6: "ground station", 10: "rover", 11: "boat", 12: "submarine"}
 _MAKERS: Final = {3: "ArduPilot", 12: "PX4"}
+_MOST_MBAR: Final = 1e7
 _PRESSURES: Final = {"SCALED_PRESSURE": 1, "SCALED_PRESSURE2": 2, "SCALED_PRESSURE3": 3}
 
 
@@ -110,7 +111,7 @@ class _Frame:
     payload: bytes
 
 
-def _frame(data: bytes) -> _Frame:
+def _taken_apart(data: bytes) -> _Frame:
     is_v1 = data[0] == _V1
     head = 6 if is_v1 else 10
     number = data[5] if is_v1 else int.from_bytes(data[7:10], "little")
@@ -120,43 +121,28 @@ def _frame(data: bytes) -> _Frame:
     return _Frame(layout.name, system, component, payload)
 
 
-class MavlinkReader:
-    """Messages of one vehicle's autopilot: the configured system, else the first one heard."""
+class Mavlink:
+    """Messages of one vehicle's autopilot: the configured system, else the first one heard.
+
+    Counted are the vehicle's messages by name, ``other``, and ``other_system``.
+    """
 
     def __init__(self, feed: Feed) -> None:
         self._system = feed.system
         self._heading_from = feed.heading_from.upper()
         self._pressure_message = feed.pressure_message
-        self._cutter = Cutter(_START, judge, byte_ns(feed))
-        self._frames: Counter[str] = Counter()
-        self._bad: Counter[str] = Counter()
         self._boot_ms: dict[str, int] = {}
         self.speaker = ""
         """What the vehicle's heartbeat says it is."""
 
-    @property
-    def counters(self) -> Counters:
-        """What was seen so far: the vehicle's messages by name, ``other``, and ``other_system``."""
-        return Counters(dict(self._frames), self._cutter.skipped, dict(self._cutter.bad + self._bad))
-
-    def push(self, t_ns: int, data: bytes) -> list[Message]:
-        """Take bytes that arrived at ``t_ns`` and return the messages that they complete."""
-        return [message for cut in self._cutter.push(t_ns, data) for message in self._read(cut)]
-
-    def finish(self) -> list[Message]:
-        """End the stream."""
-        return [message for cut in self._cutter.finish() for message in self._read(cut)]
-
-    def _read(self, cut: Cut) -> list[Message]:
-        frame = _frame(cut.data)
-        if self._system is None and frame.component == _AUTOPILOT and frame.name != "other":
-            self._system = frame.system
-        if (frame.system, frame.component) != (self._system, _AUTOPILOT):
-            self._frames["other_system"] += 1
-            return []
-        self._frames[frame.name] += 1
-        statement = self._statement(frame)
-        return [] if statement is None else [Message(cut.t_ns, frame.name, (statement,))]
+    def read(self, frame: bytes) -> Said:
+        """Return the name of a message and what it says."""
+        taken = _taken_apart(frame)
+        if self._system is None and taken.component == _AUTOPILOT and taken.name != "other":
+            self._system = taken.system
+        if (taken.system, taken.component) != (self._system, _AUTOPILOT):
+            return "other_system", ()
+        return taken.name, [each for each in [self._statement(taken)] if each is not None]
 
     def _statement(self, frame: _Frame) -> Statement | None:
         name, payload = frame.name, frame.payload
@@ -164,24 +150,16 @@ class MavlinkReader:
             vehicle, maker = _VEHICLES.get(payload[4], "vehicle"), _MAKERS.get(payload[5], "an autopilot")
             self.speaker = f"system {frame.system}: {vehicle} with {maker}"
         elif name == "RAW_IMU":
-            return Statement(Said.FIELD, math.hypot(*struct.unpack_from("<hhh", payload, 20)))
+            return Statement(Meaning.FIELD, math.hypot(*struct.unpack_from("<hhh", payload, 20)))
         elif name == "VFR_HUD" and name == self._heading_from:
-            return self._number(Said.MAGNETIC, struct.unpack_from("<h", payload, 16)[0], 360.0)
+            return _checked(Meaning.MAGNETIC, struct.unpack_from("<h", payload, 16)[0], 360.0)
         elif name == "ATTITUDE" and name == self._heading_from:
             yaw_deg = math.degrees(struct.unpack_from("<f", payload, 12)[0])
-            return self._number(Said.MAGNETIC, yaw_deg, 360.0, *self._freshness(frame))
+            return _checked(Meaning.MAGNETIC, yaw_deg, 360.0, *self._freshness(frame))
         elif _PRESSURES.get(name) == self._pressure_message:
             mbar = struct.unpack_from("<f", payload, 4)[0]
-            return self._number(Said.ABSOLUTE, mbar, 1e7, *self._freshness(frame))
+            return _checked(Meaning.ABSOLUTE, mbar, _MOST_MBAR, *self._freshness(frame))
         return None
-
-    def _number(
-        self, what: Said, value: float, most: float, quality: Quality = "good", reason: str = ""
-    ) -> Statement | None:
-        if not abs(value) <= most:  # not a number, too
-            self._bad["field"] += 1
-            return None
-        return Statement(what, value, quality, reason)
 
     def _freshness(self, frame: _Frame) -> tuple[Quality, str]:
         """Compare the autopilot's own time with that of its message before."""
@@ -189,3 +167,14 @@ class MavlinkReader:
         stands = self._boot_ms.get(frame.name) == boot_ms
         self._boot_ms[frame.name] = boot_ms
         return ("suspect", "stale: the autopilot's clock stands still") if stands else ("good", "")
+
+
+def _checked(what: Meaning, value: float, most: float, quality: Quality = "good", reason: str = "") -> Statement:
+    if not abs(value) <= most:  # not a number, too
+        raise FrameError("field")
+    return Statement(what, value, quality, reason)
+
+
+def mavlink_reader(feed: Feed) -> FrameReader:
+    """Return the reader of an autopilot's line."""
+    return FrameReader(_START, judge, Mavlink(feed), byte_ns(feed))

@@ -9,7 +9,7 @@ from typing import Final
 
 from config.errors import FrameError
 from drivers.readings import Quality
-from drivers.statements import Said, Statement
+from drivers.statements import Meaning, Statement
 
 _NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)")
 _DEEPEST_M: Final = 12_000.0
@@ -51,7 +51,7 @@ def text(fields: Fields, at: int) -> str:
     return fields[at].strip().upper() if at < len(fields) else ""
 
 
-def state_heading(what: Said, value: float | None, quality: Quality = "good", reason: str = "") -> Statements:
+def state_heading(what: Meaning, value: float | None, quality: Quality = "good", reason: str = "") -> Statements:
     """State a heading in degrees, where there is one."""
     if value is None:
         return
@@ -60,7 +60,7 @@ def state_heading(what: Said, value: float | None, quality: Quality = "good", re
     yield Statement(what, value, quality, reason)
 
 
-def state_length(what: Said, value: float | None) -> Statements:
+def state_length(what: Meaning, value: float | None) -> Statements:
     """State a depth or an altitude in metres, where there is one."""
     if value is None:
         return
@@ -69,7 +69,7 @@ def state_length(what: Said, value: float | None) -> Statements:
     yield Statement(what, value)
 
 
-def state_pressure(what: Said, value: float | None, unit_mbar: float) -> Statements:
+def state_pressure(what: Meaning, value: float | None, unit_mbar: float) -> Statements:
     """State a pressure, where there is one; ``unit_mbar`` is its unit."""
     if value is not None:
         yield Statement(what, value * unit_mbar)

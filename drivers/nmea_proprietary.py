@@ -20,7 +20,7 @@ from drivers.nmea_fields import (
     text,
 )
 from drivers.readings import Quality
-from drivers.statements import Said, Statement
+from drivers.statements import Meaning, Statement
 
 _LETTERS: Final = re.compile(r"C-?\d+(?:\.\d+)?(?:[A-Z][a-z]?-?\d+(?:\.\d+)?)*")
 _TAGGED: Final = re.compile(r"([A-Z][a-z]?)(-?\d+(?:\.\d+)?)")
@@ -34,20 +34,20 @@ def read_letters(body: str, dialect: Dialect) -> list[Statement] | None:
 
 def _pashr(fields: Fields) -> Statements:
     if text(fields, 2) == "T":
-        yield from state_heading(Said.TRUE, number(fields, 1))
+        yield from state_heading(Meaning.TRUE, number(fields, 1))
 
 
 def _ohpr(fields: Fields) -> Statements:
-    yield from state_heading(Said.MAGNETIC, number(fields, 0))
+    yield from state_heading(Meaning.MAGNETIC, number(fields, 0))
 
 
 def _psxn(fields: Fields) -> Statements:
     if text(fields, 0) == "23":
-        yield from state_heading(Said.TRUE, number(fields, 3))
+        yield from state_heading(Meaning.TRUE, number(fields, 3))
 
 
 def _prdid(fields: Fields) -> Statements:
-    yield from state_heading(Said.TRUE, number(fields, 2))
+    yield from state_heading(Meaning.TRUE, number(fields, 2))
 
 
 # Status letters of True North and Honeywell compasses; N is normal, what is not listed says nothing.
@@ -61,13 +61,13 @@ _LETTER: Final[dict[str, tuple[Quality, str]]] = {
 }
 
 
-def _tnt(what: Said, fields: Fields, unit_deg: float) -> Statements:
+def _tnt(what: Meaning, fields: Fields, unit_deg: float) -> Statements:
     heading = number(fields, 0)
     if heading is None:
         return
     strength = number(fields, 7)
     if strength is not None:
-        yield Statement(Said.FIELD, strength)
+        yield Statement(Meaning.FIELD, strength)
     quality, reason = _LETTER.get(text(fields, 1), ("good", ""))
     yield from state_heading(what, heading if unit_deg == 1.0 else heading * unit_deg % 360.0, quality, reason)
 
@@ -79,25 +79,25 @@ def _has_decimals(fields: Fields) -> bool:
 
 def _ptnthtm(fields: Fields, dialect: Dialect) -> Statements:
     found = "deg" if _has_decimals(fields) else "bam16"
-    yield from _tnt(Said.TRUE, fields, UNIT_DEG[found if dialect.angle_unit == "auto" else dialect.angle_unit])
+    yield from _tnt(Meaning.TRUE, fields, UNIT_DEG[found if dialect.angle_unit == "auto" else dialect.angle_unit])
 
 
 def _ptnthpr(fields: Fields, dialect: Dialect) -> Statements:
     if dialect.angle_unit == "auto" and fields[0].strip() and not _has_decimals(fields):
         raise FrameError("PTNTHPR without decimals is in mils or 16-bit angles; set angle_unit")
-    yield from _tnt(Said.MAGNETIC, fields, UNIT_DEG.get(dialect.angle_unit, 1.0))
+    yield from _tnt(Meaning.MAGNETIC, fields, UNIT_DEG.get(dialect.angle_unit, 1.0))
 
 
 def _pvrnd(fields: Fields) -> Statements:
-    yield from state_length(Said.DEPTH, number(fields, 2))
-    yield from state_heading(Said.MAGNETIC, number(fields, 3))
+    yield from state_length(Meaning.DEPTH, number(fields, 2))
+    yield from state_heading(Meaning.MAGNETIC, number(fields, 3))
 
 
 def _rov(fields: Fields) -> Statements:
-    yield from state_heading(Said.TRUE, number(fields, 0))
-    yield from state_length(Said.DEPTH, number(fields, 3))
+    yield from state_heading(Meaning.TRUE, number(fields, 0))
+    yield from state_length(Meaning.DEPTH, number(fields, 3))
     # A vehicle is never at 0.0 m above the floor: that is an altimeter without an echo.
-    yield from state_length(Said.ALTITUDE, number(fields, 4) or None)
+    yield from state_length(Meaning.ALTITUDE, number(fields, 4) or None)
 
 
 def _letters(body: str, dialect: Dialect) -> Statements:
@@ -107,38 +107,38 @@ def _letters(body: str, dialect: Dialect) -> Statements:
         tags[a] for a in ("Mx", "My", "Mz") if a in tags
     ]
     if len(axes) == 3:
-        yield Statement(Said.FIELD, math.hypot(*(float(axis) for axis in axes)))
+        yield Statement(Meaning.FIELD, math.hypot(*(float(axis) for axis in axes)))
     error = int(float(tags.get("E", "0")))
     quality: Quality = "suspect" if error else "good"
     reason = f"the compass reports error word E{error:03d}" if error else ""
     unit_deg = UNIT_DEG.get(dialect.angle_unit, 1.0)
-    yield from state_heading(Said.MAGNETIC, float(tags["C"]) * unit_deg, quality, reason)
+    yield from state_heading(Meaning.MAGNETIC, float(tags["C"]) * unit_deg, quality, reason)
     if "D" in tags:
-        yield from state_length(Said.DEPTH, float(tags["D"]))
+        yield from state_length(Meaning.DEPTH, float(tags["D"]))
 
 
 def _pips(fields: Fields) -> Statements:
     """Valeport pressure sensors that convert to metres themselves."""
     if text(fields, 1) == "M":
-        yield from state_length(Said.DEPTH, number(fields, 0))
+        yield from state_length(Meaning.DEPTH, number(fields, 0))
 
 
 def _pvips2(fields: Fields) -> Statements:
     if text(fields, 5) == "M":
-        yield from state_length(Said.DEPTH, number(fields, 4))
+        yield from state_length(Meaning.DEPTH, number(fields, 4))
 
 
 def _prvat(fields: Fields) -> Statements:
     """Valeport altimeter with a pressure sensor, which reads the air's pressure in air."""
     if text(fields, 1) == "M":
-        yield from state_length(Said.ALTITUDE, number(fields, 0))
+        yield from state_length(Meaning.ALTITUDE, number(fields, 0))
     if text(fields, 3) == "DBAR":
-        yield from state_pressure(Said.ABSOLUTE, number(fields, 2), _DBAR_MBAR)
+        yield from state_pressure(Meaning.ABSOLUTE, number(fields, 2), _DBAR_MBAR)
 
 
 def _isads(fields: Fields) -> Statements:
     if text(fields, 1) == "M":
-        yield from state_length(Said.ALTITUDE, number(fields, 0))
+        yield from state_length(Meaning.ALTITUDE, number(fields, 0))
 
 
 PROPRIETARY: Final[dict[str, Callable[[Fields], Statements]]] = {

@@ -11,7 +11,7 @@ from typing import Final
 from config.errors import FrameError
 from drivers.nmea_fields import Dialect, Fields, Statements, number, state_heading, state_length, state_pressure, text
 from drivers.nmea_proprietary import PROPRIETARY, TRUE_NORTH, read_letters
-from drivers.statements import Said, Statement
+from drivers.statements import Meaning, Statement
 
 _FOOT_M: Final = 0.3048
 _FATHOM_M: Final = 1.8288
@@ -50,18 +50,18 @@ def _hdg(fields: Fields) -> Statements:
     # Compasses that know no variation write 0.0 as often as nothing.
     variation = _toward(number(fields, 3), text(fields, 4))
     if variation:
-        yield Statement(Said.VARIATION, variation)
+        yield Statement(Meaning.VARIATION, variation)
     if heading is not None:
         corrected = heading + _toward(number(fields, 1), text(fields, 2))
-        yield from state_heading(Said.MAGNETIC, corrected % 360.0 if abs(heading) <= 360.0 else heading)
+        yield from state_heading(Meaning.MAGNETIC, corrected % 360.0 if abs(heading) <= 360.0 else heading)
 
 
 def _hdm(fields: Fields) -> Statements:
-    yield from state_heading(Said.MAGNETIC, number(fields, 0))
+    yield from state_heading(Meaning.MAGNETIC, number(fields, 0))
 
 
 def _hdt(fields: Fields) -> Statements:
-    yield from state_heading(Said.TRUE, number(fields, 0))
+    yield from state_heading(Meaning.TRUE, number(fields, 0))
 
 
 def _ths(fields: Fields) -> Statements:
@@ -70,15 +70,15 @@ def _ths(fields: Fields) -> Statements:
     if mode == "A":
         yield from _hdt(fields)
     elif mode == "E":
-        yield from state_heading(Said.TRUE, number(fields, 0), "suspect", "estimated by the compass (mode E)")
+        yield from state_heading(Meaning.TRUE, number(fields, 0), "suspect", "estimated by the compass (mode E)")
 
 
 def _vhw(fields: Fields) -> Statements:
     true = number(fields, 0)
     if true is not None:
-        yield from state_heading(Said.TRUE, true)
+        yield from state_heading(Meaning.TRUE, true)
     else:
-        yield from state_heading(Said.MAGNETIC, number(fields, 2))
+        yield from state_heading(Meaning.MAGNETIC, number(fields, 2))
 
 
 def _metres(fields: Fields) -> float | None:
@@ -90,12 +90,12 @@ def _metres(fields: Fields) -> float | None:
 
 
 def _dbt(fields: Fields) -> Statements:
-    yield from state_length(Said.BELOW_SURFACE, _metres(fields))
-    yield from state_length(Said.ABOVE_FLOOR, _metres(fields))
+    yield from state_length(Meaning.BELOW_SURFACE, _metres(fields))
+    yield from state_length(Meaning.ABOVE_FLOOR, _metres(fields))
 
 
 def _dbs(fields: Fields) -> Statements:
-    yield from state_length(Said.BELOW_SURFACE, _metres(fields))
+    yield from state_length(Meaning.BELOW_SURFACE, _metres(fields))
 
 
 def _dpt(fields: Fields) -> Statements:
@@ -104,8 +104,8 @@ def _dpt(fields: Fields) -> Statements:
         return
     # A positive offset is from the transducer up to the waterline; a negative one is to the keel.
     offset = max(number(fields, 1) or 0.0, 0.0)
-    yield from state_length(Said.BELOW_SURFACE, below + offset)
-    yield from state_length(Said.ABOVE_FLOOR, below)
+    yield from state_length(Meaning.BELOW_SURFACE, below + offset)
+    yield from state_length(Meaning.ABOVE_FLOOR, below)
 
 
 def _xdr(fields: Fields, dialect: Dialect) -> Statements:
@@ -113,9 +113,9 @@ def _xdr(fields: Fields, dialect: Dialect) -> Statements:
     for at in range(0, len(fields) - 3, 4):
         kind, unit, name = text(fields, at), text(fields, at + 2), text(fields, at + 3)
         if kind == "D" and unit == "M" and name in dialect.depth_names:
-            yield from state_length(Said.DEPTH, number(fields, at + 1))
+            yield from state_length(Meaning.DEPTH, number(fields, at + 1))
         elif kind == "P" and unit in _MBAR and name in dialect.pressure_names:
-            yield from state_pressure(Said.PRESSURE, number(fields, at + 1), _MBAR[unit])
+            yield from state_pressure(Meaning.PRESSURE, number(fields, at + 1), _MBAR[unit])
 
 
 STANDARD: Final[dict[str, Callable[[Fields], Statements]]] = {

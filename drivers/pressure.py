@@ -12,8 +12,8 @@ from typing import Final
 
 from config.schema import Feed
 from drivers.counters import Counters
-from drivers.keller import KellerReader
-from drivers.statements import Message, Reader, Said, Statement
+from drivers.keller import keller_reader
+from drivers.statements import Meaning, Message, Reader, Statement
 from drivers.wire import Arrivals, byte_ns
 
 _LONGEST: Final = 256
@@ -34,7 +34,7 @@ _METRES: Final = {"m": 1.0, "ft": 0.3048}
 
 def pressure_reader(feed: Feed) -> Reader:
     """Return the reader of the feed's format."""
-    return KellerReader(feed) if feed.format == "keller" else TextReader(feed)
+    return keller_reader(feed) if feed.format == "keller" else TextReader(feed)
 
 
 class TextReader:
@@ -101,5 +101,5 @@ class TextReader:
 
     def _statement(self, value: float) -> Statement:
         if self._unit in _METRES:
-            return Statement(Said.DEPTH, value * _METRES[self._unit])
-        return Statement(Said.PRESSURE, value * _MBAR[self._unit])
+            return Statement(Meaning.DEPTH, value * _METRES[self._unit])
+        return Statement(Meaning.PRESSURE, value * _MBAR[self._unit])

@@ -10,7 +10,7 @@ from drivers.counters import Counters
 from drivers.readings import Quality
 
 
-class Said(Enum):
+class Meaning(Enum):
     """What a number means."""
 
     MAGNETIC = "magnetic heading, degrees"
@@ -30,7 +30,7 @@ class Said(Enum):
 class Statement:
     """One number of a message, and the device's own opinion of it."""
 
-    what: Said
+    what: Meaning
     value: float
     quality: Quality = "good"
     reason: str = ""

@@ -11,13 +11,12 @@ begins where it ends.  A byte lost on the way moves a header into the count, whi
 from __future__ import annotations
 
 import re
-from collections import Counter
 from typing import Final
 
 from config.schema import Feed
-from drivers.counters import Counters
-from drivers.statements import Message, Said, Statement
-from drivers.wire import MORE, Cut, Cutter, byte_ns
+from drivers.framed import FrameReader, Said
+from drivers.statements import Meaning, Statement
+from drivers.wire import MORE, byte_ns
 
 _REPLY: Final = b"\x28\x31"
 _REQUEST: Final = b"\x23\x31"
@@ -52,40 +51,32 @@ def _is_request(frame: bytearray) -> bool:
     return max(frame[2:5]) <= _FULL_THRUST and frame[5] <= _FULL_LIGHT
 
 
-class Pro3Reader:
-    """Heading and depth of the vehicle; ``depth_points`` are two counts of its own sensor and their depths."""
+class Pro3:
+    """Heading and depth in replies; ``depth_points`` are two counts of the vehicle's own sensor and their depths.
+
+    Counted are ``reply`` and ``request``.
+    """
 
     def __init__(self, feed: Feed) -> None:
         self._points = feed.depth_points
-        self._cutter = Cutter(_START, judge, byte_ns(feed))
-        self._frames: Counter[str] = Counter()
         self.count: int | None = None
         """Depth sensor's count in the newest reply, for calibration."""
 
-    @property
-    def counters(self) -> Counters:
-        """What was seen so far: ``reply`` and ``request``."""
-        return Counters(dict(self._frames), self._cutter.skipped, dict(self._cutter.bad))
-
-    def push(self, t_ns: int, data: bytes) -> list[Message]:
-        """Take bytes that arrived at ``t_ns`` and return the messages that they complete."""
-        return [message for cut in self._cutter.push(t_ns, data) for message in self._read(cut)]
-
-    def finish(self) -> list[Message]:
-        """End the stream."""
-        return [message for cut in self._cutter.finish() for message in self._read(cut)]
-
-    def _read(self, cut: Cut) -> list[Message]:
-        if cut.data[:2] == _REQUEST:
-            self._frames["request"] += 1
-            return []
-        self._frames["reply"] += 1
-        orientation = int.from_bytes(cut.data[3:5], "little")
-        self.count = int.from_bytes(cut.data[5:7], "little")
+    def read(self, frame: bytes) -> Said:
+        """Return the name of a frame and what it says."""
+        if frame[:2] == _REQUEST:
+            return "request", ()
+        orientation = int.from_bytes(frame[3:5], "little")
+        self.count = int.from_bytes(frame[5:7], "little")
         # The sensor looks the other way round and a quarter turn off.
-        statements = [Statement(Said.MAGNETIC, float((270 - orientation) % 360))]
-        if self._points is not None:
-            (low, low_m), (high, high_m) = self._points
-            depth_m = low_m + (self.count - low) * (high_m - low_m) / (high - low)
-            statements.append(Statement(Said.DEPTH, depth_m))
-        return [Message(cut.t_ns, "reply", tuple(statements))]
+        heading = Statement(Meaning.MAGNETIC, float((270 - orientation) % 360))
+        if self._points is None:
+            return "reply", (heading,)
+        (low, low_m), (high, high_m) = self._points
+        depth_m = low_m + (self.count - low) * (high_m - low_m) / (high - low)
+        return "reply", (heading, Statement(Meaning.DEPTH, depth_m))
+
+
+def pro3_reader(feed: Feed) -> FrameReader:
+    """Return the reader of a Pro 3's line."""
+    return FrameReader(_START, judge, Pro3(feed), byte_ns(feed))

@@ -11,15 +11,15 @@ from __future__ import annotations
 
 import re
 import struct
-from collections import Counter
 from functools import reduce
 from operator import xor
 from typing import Final
 
+from config.errors import FrameError
 from config.schema import Feed
-from drivers.counters import Counters
-from drivers.statements import Message, Said, Statement
-from drivers.wire import MORE, Cut, Cutter, byte_ns
+from drivers.framed import FrameReader, Said
+from drivers.statements import Meaning, Statement
+from drivers.wire import MORE, byte_ns
 
 _REQUEST: Final = b"\xfa\xaf"
 _RESPONSE: Final = b"\xfd\xdf"
@@ -61,43 +61,32 @@ def judge(buffer: bytearray, at: int, _is_synced: bool) -> int | str:
     return "checksum" if reduce(xor, buffer[start : start + length + 1]) else start + length + 1 - at
 
 
-class Pro4Reader:
-    """Headings and pressures in the vehicle's replies; requests of whoever asks are counted."""
+class Pro4:
+    """Headings and pressures in the vehicle's replies.
+
+    Counted are ``navigation`` and ``registers`` (replies with both), ``other``, and ``request`` of whoever asks.
+    """
 
     def __init__(self, feed: Feed) -> None:
         # Tenths of a degree but for early firmware.
         self._unit_deg = 1.0 if feed.angle_unit == "deg" else 0.1
-        self._cutter = Cutter(_START, judge, byte_ns(feed))
-        self._frames: Counter[str] = Counter()
-        self._bad: Counter[str] = Counter()
 
-    @property
-    def counters(self) -> Counters:
-        """What was seen so far: ``navigation`` and ``registers`` (replies), ``other``, ``request``."""
-        return Counters(dict(self._frames), self._cutter.skipped, dict(self._cutter.bad + self._bad))
-
-    def push(self, t_ns: int, data: bytes) -> list[Message]:
-        """Take bytes that arrived at ``t_ns`` and return the messages that they complete."""
-        return [message for cut in self._cutter.push(t_ns, data) for message in self._read(cut)]
-
-    def finish(self) -> list[Message]:
-        """End the stream."""
-        return [message for cut in self._cutter.finish() for message in self._read(cut)]
-
-    def _read(self, cut: Cut) -> list[Message]:
-        if cut.data[:2] == _REQUEST:
-            self._frames["request"] += 1
-            return []
-        found = _navigation(cut.data)
-        name, heading, mbar = found or ("other", 0, 0)
-        self._frames[name] += 1
+    def read(self, frame: bytes) -> Said:
+        """Return the name of a packet and what it says."""
+        if frame[:2] == _REQUEST:
+            return "request", ()
+        found = _navigation(frame)
         if found is None:
-            return []
+            return "other", ()
+        name, heading, mbar = found
         if abs(heading * self._unit_deg) > 360.0:
-            self._bad["field"] += 1
-            return []
-        said = Statement(Said.MAGNETIC, heading * self._unit_deg), Statement(Said.ABSOLUTE, float(mbar))
-        return [Message(cut.t_ns, name, said)]
+            raise FrameError("field")
+        return name, (Statement(Meaning.MAGNETIC, heading * self._unit_deg), Statement(Meaning.ABSOLUTE, float(mbar)))
+
+
+def pro4_reader(feed: Feed) -> FrameReader:
+    """Return the reader of a Pro 4's line."""
+    return FrameReader(_START, judge, Pro4(feed), byte_ns(feed))
 
 
 def _navigation(packet: bytes) -> tuple[str, int, int] | None:

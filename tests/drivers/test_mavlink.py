@@ -13,8 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from config.schema import Feed, Site
-from drivers.mavlink import LAYOUTS, MavlinkReader, crc
-from drivers.wire import Cutter
+from drivers.mavlink import LAYOUTS, Mavlink, crc, mavlink_reader
 from tests.drivers.feedframes import attitude, mavlink1, mavlink2, scaled_pressure
 from tests.drivers.feedkit import CUTS, assert_any_cut_is_the_same, opinions, plain, run
 
@@ -113,9 +112,9 @@ def test_only_the_autopilot_of_one_vehicle_is_heard() -> None:
 
 
 def test_a_heartbeat_names_the_vehicle() -> None:
-    reader = MavlinkReader(LINE)
-    reader.push(0, mavlink2(0, struct.pack("<IBBBBB", 19, 12, 3, 209, 4, 3)))
-    assert reader.speaker == "system 1: submarine with ArduPilot"
+    vehicle = Mavlink(LINE)
+    vehicle.read(mavlink2(0, struct.pack("<IBBBBB", 19, 12, 3, 209, 4, 3)))
+    assert vehicle.speaker == "system 1: submarine with ArduPilot"
 
 
 def test_unknown_messages_are_skipped_whole_between_frames() -> None:
@@ -188,10 +187,9 @@ def test_any_pieces_give_the_same(data: bytes, cuts: list[int]) -> None:
 @settings(max_examples=50, deadline=None)
 @given(st.binary(max_size=3000))
 def test_garbage_is_counted_and_not_kept(data: bytes) -> None:
-    reader = MavlinkReader(LINE)
+    reader = mavlink_reader(LINE)
     reader.push(0, data)
-    cutter: Cutter = reader._cutter
-    assert cutter.pending <= 12 + 255 + 13
+    assert reader.pending <= 12 + 255 + 13
     reader.finish()
-    assert cutter.pending == 0
+    assert reader.pending == 0
     assert reader.counters.skipped_bytes == len(data) or reader.counters.frames

@@ -16,7 +16,8 @@ from config.schema import Config, Feed, Quantity, Site
 from drivers.counters import Counters
 from drivers.decoders import decoders_for, feed_decoder
 from drivers.nmea_lines import LONGEST, SentenceReader, xor
-from drivers.readings import Altitude, Depth, Heading, Reading
+from drivers.readings import Heading, Reading
+from tests.drivers.feedkit import plain
 
 ALL: tuple[Quantity, ...] = ("heading", "depth", "altitude")
 
@@ -46,17 +47,6 @@ def said(body: str, using: Feed | None = None, declination: float = 0.0) -> list
     """Kind and value (degrees, metres) of each reading of one sentence."""
     readings, _ = run([(0, line(body))], using, declination)
     return [plain(reading) for reading in readings]
-
-
-def plain(reading: Reading) -> tuple[str, float]:
-    match reading:
-        case Heading(heading_rad=heading_rad):
-            return "heading", round(math.degrees(heading_rad), 6)
-        case Depth(depth_m=depth_m):
-            return "depth", round(depth_m, 6)
-        case Altitude(altitude_m=altitude_m):
-            return "altitude", round(altitude_m, 6)
-    raise AssertionError(reading)
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from config.schema import Feed, Site
-from drivers.keller import KellerReader, crc16, initialise, read_channel
+from drivers.keller import crc16, initialise, keller_reader, read_channel
 from drivers.polls import Poller
 from drivers.pressure import TextReader
 from tests.drivers.feedframes import keller_reply
@@ -160,11 +160,11 @@ def test_any_pieces_of_a_keller_bus_give_the_same(data: bytes, cuts: list[int]) 
 @settings(max_examples=50, deadline=None)
 @given(st.binary(max_size=3000))
 def test_garbage_is_not_kept(data: bytes) -> None:
-    reader = KellerReader(KELLER)
+    reader = keller_reader(KELLER)
     reader.push(0, data)
-    assert reader._cutter.pending <= 10
+    assert reader.pending <= 10
     reader.finish()
-    assert reader._cutter.pending == 0
+    assert reader.pending == 0
 
 
 def test_salt_water_and_latitude_change_the_depth() -> None:

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from config.schema import Feed, Site
 from drivers.polls import Poller
-from drivers.videoray_pro3 import Pro3Reader
-from drivers.videoray_pro4 import NAVIGATION_REQUEST, Pro4Reader
+from drivers.videoray_pro3 import Pro3, pro3_reader
+from drivers.videoray_pro4 import NAVIGATION_REQUEST, pro4_reader
 from tests.drivers.feedframes import PRO3_REQUEST, pro3_reply, pro4_navigation, pro4_packet
 from tests.drivers.feedkit import CUTS, assert_any_cut_is_the_same, opinions, plain, run
 
@@ -38,9 +38,9 @@ def pro3_vectors(shared_data: Path) -> list[bytes]:
 )
 def test_replies_of_a_pro_3(shared_data: Path, index: int, heading_deg: int, count: int) -> None:
     frame = pro3_vectors(shared_data)[index]
-    reader = Pro3Reader(PRO3)
-    (message,) = reader.push(0, frame + PRO3_REQUEST)
-    assert (message.statements[0].value, reader.count) == (heading_deg, count)
+    vehicle = Pro3(PRO3)
+    name, statements = vehicle.read(frame)
+    assert (name, statements[0].value, vehicle.count) == ("reply", heading_deg, count)
     readings, counters = run(PRO3, [(0, frame + PRO3_REQUEST * 2)])
     depth_m = 34.2 * (1017 - count) / (1017 - 313)
     assert [plain(each) for each in readings] == [("heading", heading_deg), ("depth", round(depth_m, 6))]
@@ -199,11 +199,11 @@ def test_any_pieces_of_a_pro_4_give_the_same(data: bytes, cuts: list[int]) -> No
 @settings(max_examples=50, deadline=None)
 @given(st.binary(max_size=5000))
 def test_garbage_is_not_kept(data: bytes) -> None:
-    pro3, pro4 = Pro3Reader(PRO3), Pro4Reader(PRO4)
+    pro3, pro4 = pro3_reader(PRO3), pro4_reader(PRO4)
     pro3.push(0, data)
     pro4.push(0, data)
-    assert pro3._cutter.pending <= 10
-    assert pro4._cutter.pending <= 4096 + 11
+    assert pro3.pending <= 10
+    assert pro4.pending <= 4096 + 11
     assert pro3.finish() == []
     pro4.finish()
-    assert pro3._cutter.pending == pro4._cutter.pending == 0
+    assert pro3.pending == pro4.pending == 0
