@@ -74,7 +74,7 @@ class Match:
 
     ``overlap`` is the share of the scan's weight that lies on known walls; ``weak_rad`` the direction (clockwise from
     north, in [0, pi)) in which the walls hold it least, and ``hold`` the information there, 0 to 0.5 of the whole.
-    ``height`` is the log-posterior, ``other`` the best pose elsewhere.
+    ``height`` is the log-posterior, ``fit`` the same per independent point, ``other`` the best pose elsewhere.
     """
 
     pose: Pose
@@ -84,6 +84,7 @@ class Match:
     weak_rad: float
     hold: float
     height: float
+    fit: float
     other: Pose
 
 
@@ -152,7 +153,8 @@ def register(scan: View, reference: View, prior: Prior, particles: int, rng: np.
     mean, covariance = local_moments(like, best)
     weak, hold = weakest_direction(scan, reference, mean)
     on_walls = overlap(scan, reference, mean)
-    return Match(_pose(mean), covariance, height - other_height, on_walls, weak, hold, height, _pose(other))
+    fit = height / max(like.witnesses, 1.0)
+    return Match(_pose(mean), covariance, height - other_height, on_walls, weak, hold, height, fit, _pose(other))
 
 
 def _pose(state: NDArray[np.float64]) -> Pose:

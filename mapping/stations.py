@@ -21,6 +21,12 @@ ACCEPT_MARGIN = 8.0
 DOUBT_MARGIN = 3.0
 ACCEPT_OVERLAP = 0.35
 """Share of a scan's walls that must lie on known ones."""
+ACCEPT_FIT = 0.68
+"""Log-posterior per independent point: a scan whose true place is out of reach fits somewhere, but badly."""
+GAP_MARGIN, GAP_FIT = 16.0, 1.2
+"""The same where neither the scan before nor the one after is placed: pillars repeat, and reach is no bound then."""
+TRIES = 6
+"""Waiting scans tried again for one new station: it must not take longer as the dive goes on."""
 ACCEPT_SD_M = 0.3
 FEW_POINTS = 12
 """Scans with fewer wall points cannot be placed, and no map can begin with them."""
@@ -101,6 +107,7 @@ class Stations:
         self._stations: list[Station] = []
         self._sights: list[Sight] = []
         self._hints: list[Hint | None] = []
+        self._tried: dict[int, int] = {}  # a waiting scan, and how many stations were placed when it was tried last
 
     @property
     def all(self) -> tuple[Station, ...]:
@@ -153,8 +160,15 @@ class Stations:
         return [k for k, s in enumerate(self._stations) if s.status == "placed"]
 
     def _try_again(self, newest: int) -> None:
-        waiting = [i for i, s in enumerate(self._stations[:newest]) if s.status in ("doubtful", "unplaced")]
-        for i in waiting:
+        """Try waiting scans once more that come just before or after a placed one, outward from the newest."""
+        for _ in range(TRIES):
+            placed = set(self._placed())
+            waiting = [i for i in range(newest) if self._stations[i].status in ("doubtful", "unplaced")]
+            chained = [i for i in waiting if {i - 1, i + 1} & placed and self._tried.get(i) != len(placed)]
+            if not chained:
+                return
+            i = max(chained)
+            self._tried[i] = len(placed)
             again = self._place(i)
             if again.status == "placed":
                 self._stations[i] = again
@@ -222,7 +236,10 @@ class Stations:
         scan = self._sights[i].scan
         sd_m = math.sqrt(float(np.linalg.eigvalsh(match.covariance[:2, :2])[-1]))
         status: Status = "placed"
-        if match.margin < ACCEPT_MARGIN or match.overlap < ACCEPT_OVERLAP or sd_m > ACCEPT_SD_M:
+        chained = any(abs(k - i) == 1 for k in self._placed())
+        margin, fit = (ACCEPT_MARGIN, ACCEPT_FIT) if chained else (GAP_MARGIN, GAP_FIT)
+        fits = match.overlap >= ACCEPT_OVERLAP and match.fit >= fit
+        if match.margin < margin or not fits or sd_m > ACCEPT_SD_M:
             status = "doubtful" if match.margin >= DOUBT_MARGIN else "unplaced"
         piece = i + 1 if status == "unplaced" else 0
         return Station(scan, match.pose, match.covariance, status, piece, match.margin, _why(status, match, sd_m))
@@ -236,6 +253,6 @@ def _why(status: Status, match: Match, sd_m: float) -> str:
     weak = round(math.degrees(match.weak_rad)) % 180
     if sd_m > ACCEPT_SD_M or match.hold < 0.05:
         return f"could slide along {weak} degrees / {weak + 180} degrees: {fits}; take a scan nearer to the last one"
-    if match.overlap < ACCEPT_OVERLAP:
-        return f"only {fits}: take a scan nearer to the last one"
+    if match.overlap < ACCEPT_OVERLAP or match.fit < ACCEPT_FIT:
+        return f"fits badly, {fits}: take a scan nearer to the last one"
     return f"fits nearly as well elsewhere: {fits}; take a scan nearer to the last one, or give a hint"

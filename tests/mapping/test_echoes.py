@@ -17,7 +17,7 @@ from tests.mapping.rooms import BIN_M, BINS, KEYHOLE, RECTANGLE, STEP_RAD, cast,
 
 def scan_of(walls: np.ndarray, x_m: float = 0.0, y_m: float = 0.0, beams: int = 200, seed: int = 5) -> Scan:
     rng = np.random.default_rng(seed)
-    bearing = np.arange(beams) * STEP_RAD
+    bearing = np.arange(beams, dtype=np.float64) * STEP_RAD
     echoes = np.stack([echoes_of(*cast(walls, x_m, y_m, float(b)), rng) for b in bearing])
     return Scan(0, 0, 1, 0.0, math.nan, bearing, echoes, BIN_M, STEP_RAD, "full" if beams == 200 else "partial")
 
@@ -27,7 +27,7 @@ def truth_of(walls: np.ndarray, scan: Scan, x_m: float = 0.0, y_m: float = 0.0) 
 
 
 @pytest.mark.parametrize("walls", [RECTANGLE, KEYHOLE])
-def test_walls_are_found_and_sure_ones_are_right(walls: np.ndarray):
+def test_walls_are_found_and_sure_ones_are_right(walls: np.ndarray) -> None:
     scan = scan_of(walls)
     returns, truth = pick(scan, Map()), truth_of(walls, scan)
     sure = returns.sd_m < VAGUE_SD_M
@@ -35,13 +35,13 @@ def test_walls_are_found_and_sure_ones_are_right(walls: np.ndarray):
     assert np.mean(np.abs(returns.range_m - truth)[sure] < 0.1) > 0.97
 
 
-def test_no_water_is_told_open_behind_a_wall():
+def test_no_water_is_told_open_behind_a_wall() -> None:
     for x_m, y_m in ((0.0, 0.0), (1.2, -1.0), (0.2, 3.0)):
         scan = scan_of(KEYHOLE, x_m, y_m)
         assert np.mean(pick(scan, Map()).free_m > truth_of(KEYHOLE, scan, x_m, y_m) + 0.15) < 0.02
 
 
-def test_second_bounces_are_not_walls():
+def test_second_bounces_are_not_walls() -> None:
     scan = scan_of(RECTANGLE)
     echoes = scan.echoes.copy()
     for i, r in enumerate(truth_of(RECTANGLE, scan)):
@@ -54,7 +54,7 @@ def test_second_bounces_are_not_walls():
     assert np.mean(np.abs(returns.range_m - truth)[answers] < 0.2) > 0.95
 
 
-def test_a_ring_at_all_bearings_is_no_wall():
+def test_a_ring_at_all_bearings_is_no_wall() -> None:
     scan = scan_of(RECTANGLE)
     echoes = scan.echoes.copy()
     echoes[:, 50:54] = np.maximum(echoes[:, 50:54], 75)
@@ -62,7 +62,7 @@ def test_a_ring_at_all_bearings_is_no_wall():
     assert np.mean(np.abs(returns.range_m - 1.04) < 0.1) < 0.03
 
 
-def test_noise_alone_has_no_walls_and_no_open_water():
+def test_noise_alone_has_no_walls_and_no_open_water() -> None:
     rng = np.random.default_rng(2)
     echoes = np.clip(rng.normal(20.0, 6.0, (200, BINS)), 0, 255).astype(np.uint8)
     returns = pick(replace(scan_of(RECTANGLE), echoes=echoes), Map())
@@ -72,14 +72,14 @@ def test_noise_alone_has_no_walls_and_no_open_water():
 
 @given(shift=st.integers(0, 199), reverse=st.booleans())
 @settings(max_examples=12, deadline=None)
-def test_where_the_circle_begins_and_which_way_it_turns_do_not_matter(shift: int, reverse: bool):
+def test_where_the_circle_begins_and_which_way_it_turns_do_not_matter(shift: int, reverse: bool) -> None:
     scan = scan_of(KEYHOLE)
     way = np.roll(np.arange(200), shift)[:: -1 if reverse else 1]
     turned = replace(scan, bearing_rad=scan.bearing_rad[way] % (2.0 * math.pi), echoes=scan.echoes[way])
     np.testing.assert_array_equal(pick(turned, Map()).range_m, pick(scan, Map()).range_m[way])
 
 
-def test_a_sector_is_not_closed_and_starts_at_its_end():
+def test_a_sector_is_not_closed_and_starts_at_its_end() -> None:
     scan = scan_of(RECTANGLE, beams=70)
     across = replace(scan, bearing_rad=(scan.bearing_rad - 1.0) % (2.0 * math.pi))
     order, closed = in_order(across)
@@ -88,7 +88,7 @@ def test_a_sector_is_not_closed_and_starts_at_its_end():
     assert np.isfinite(pick(across, Map()).range_m).any()
 
 
-def test_tiny_scans_say_nothing():
+def test_tiny_scans_say_nothing() -> None:
     scan = scan_of(RECTANGLE, beams=3)
     returns = pick(scan, Map())
     assert np.isnan(returns.range_m).all()
@@ -97,13 +97,13 @@ def test_tiny_scans_say_nothing():
     assert len(pick(none, Map()).range_m) == 0
 
 
-def test_the_range_offset_is_added():
+def test_the_range_offset_is_added() -> None:
     scan = scan_of(RECTANGLE)
     plain, moved = pick(scan, Map()), pick(scan, Map(range_offset_m=-0.1))
     np.testing.assert_allclose(moved.range_m, plain.range_m - 0.1)
 
 
-def test_the_contour_prefers_the_unbroken_line_to_louder_specks():
+def test_the_contour_prefers_the_unbroken_line_to_louder_specks() -> None:
     excess = np.zeros((60, 100))
     excess[:, 50] = 50.0
     excess[::7, 80] = 90.0

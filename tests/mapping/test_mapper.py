@@ -16,7 +16,7 @@ from drivers.readings import Reading
 from mapping.mapper import Mapper
 from mapping.scan import ScanBuilder
 from mapping.values import OCCUPIED, Grid, Scan, Station
-from tests.mapping.rooms import KEYHOLE, TUNNEL, Stay, pings
+from tests.mapping.rooms import KEYHOLE, RECTANGLE, TUNNEL, Stay, pings
 from tests.mapping.test_scan_builder import build, tank
 
 PLACES = [Stay(0.3, -0.5, 0.4, 330), Stay(0.1, 2.0, 1.2, 330, glide=250), Stay(0.2, 4.7, 5.9, 330, glide=280)]
@@ -42,7 +42,7 @@ def offset(station: Station, stay: Stay, origin: Stay) -> float:
     return math.hypot(station.pose.x_m - stay.x_m + origin.x_m, station.pose.y_m - stay.y_m + origin.y_m)
 
 
-def test_stations_are_placed_where_they_were(keyhole: list[Scan]):
+def test_stations_are_placed_where_they_were(keyhole: list[Scan]) -> None:
     mapper = mapped(keyhole)
     assert [s.status for s in mapper.stations] == ["placed"] * 3
     for station, stay in zip(mapper.stations, PLACES, strict=True):
@@ -52,14 +52,14 @@ def test_stations_are_placed_where_they_were(keyhole: list[Scan]):
     assert math.isnan(mapper.stations[0].margin)
 
 
-def test_stated_errors_are_honest(keyhole: list[Scan]):
+def test_stated_errors_are_honest(keyhole: list[Scan]) -> None:
     for station, stay in list(zip(mapped(keyhole).stations, PLACES, strict=True))[1:]:
         off = np.array([station.pose.x_m - stay.x_m + 0.3, station.pose.y_m - stay.y_m - 0.5])
         assert off @ np.linalg.solve(station.covariance[:2, :2], off) < 9.0
         assert np.linalg.eigvalsh(station.covariance).min() > 0.0
 
 
-def test_the_same_scans_give_the_same_bytes(keyhole: list[Scan]):
+def test_the_same_scans_give_the_same_bytes(keyhole: list[Scan]) -> None:
     one, two = mapped(keyhole), mapped(keyhole)
     assert one.grid.log_odds.tobytes() == two.grid.log_odds.tobytes()
     assert [s.pose for s in one.stations] == [s.pose for s in two.stations]
@@ -74,7 +74,7 @@ def tunnel() -> list[Scan]:
     return [first, replace(second, index=1)]
 
 
-def test_a_tunnel_is_not_placed_and_its_direction_is_told():
+def test_a_tunnel_is_not_placed_and_its_direction_is_told() -> None:
     first, second = mapped(tunnel()).stations
     assert first.status == "placed"
     assert second.status in ("doubtful", "unplaced")
@@ -84,7 +84,7 @@ def test_a_tunnel_is_not_placed_and_its_direction_is_told():
     assert min(abs(along - 90), abs(along - 270)) <= 12
 
 
-def test_a_hint_places_what_would_slide():
+def test_a_hint_places_what_would_slide() -> None:
     scans = tunnel()
     mapper = Mapper(Map())
     mapper.step(scans[0])
@@ -93,7 +93,14 @@ def test_a_hint_places_what_would_slide():
     assert offset(station, Stay(2.0, -0.1, 0.3, 0), Stay(0.0, 0.1, 0.2, 0)) < 0.5
 
 
-def test_a_dropped_station_leaves_the_grid(keyhole: list[Scan]):
+def test_a_scan_of_another_room_is_not_forced_into_the_map(keyhole: list[Scan]) -> None:
+    (foreign,) = scans_in(RECTANGLE, [Stay(1.0, -0.4, 0.7, 330)])
+    station = mapped([keyhole[0], replace(foreign, index=1)]).stations[1]
+    assert station.status != "placed"
+    assert station.why
+
+
+def test_a_dropped_station_leaves_the_grid(keyhole: list[Scan]) -> None:
     mapper = mapped(keyhole)
     whole = mapper.grid
     assert mapper.drop(keyhole[2].index)
@@ -102,13 +109,13 @@ def test_a_dropped_station_leaves_the_grid(keyhole: list[Scan]):
     assert not mapper.drop(99)
 
 
-def test_before_the_first_scan_there_is_no_cell():
+def test_before_the_first_scan_there_is_no_cell() -> None:
     mapper = Mapper(Map())
     assert mapper.grid.state.shape == (0, 0)
     assert mapper.stations == ()
 
 
-def test_a_scan_without_walls_waits_and_does_not_begin_the_map(keyhole: list[Scan]):
+def test_a_scan_without_walls_waits_and_does_not_begin_the_map(keyhole: list[Scan]) -> None:
     far = np.array([[-90.0, -90.0], [90.0, -90.0], [90.0, 90.0], [-90.0, 90.0]])
     (empty,) = scans_in(far, [Stay(0.0, 0.0, 0.0, 200)])
     mapper = mapped([empty, keyhole[0]])
@@ -116,7 +123,7 @@ def test_a_scan_without_walls_waits_and_does_not_begin_the_map(keyhole: list[Sca
     assert mapper.stations[1].pose.x_m == 0.0
 
 
-def test_scans_at_another_depth_fit_a_well_that_widens():
+def test_scans_at_another_depth_fit_a_well_that_widens() -> None:
     turn = np.arange(60) / 60.0 * 2.0 * math.pi
     radius = 2.0 + 0.3 * np.cos(3.0 * turn) + 0.2 * np.sin(2.0 * turn)
     well = np.stack([radius * np.sin(turn), radius * np.cos(turn)], axis=1)
@@ -151,7 +158,7 @@ def _edge(w: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize("circles", [1, 2, 14])
-def test_the_real_tank_is_one_rectangular_room(shared_data: Path, circles: int):
+def test_the_real_tank_is_one_rectangular_room(shared_data: Path, circles: int) -> None:
     mapper = mapped(build(tank(shared_data, 200 * circles)))
     assert [s.status for s in mapper.stations] == ["placed"]
     share, one, other = fitted_share(mapper.grid)
@@ -175,7 +182,7 @@ def readings_of(dive: Path) -> list[Reading]:
 @pytest.mark.parametrize(("site", "stations", "median_m"), [("pool", 6, 0.05), ("bell", 5, 0.15)])
 def test_every_station_of_a_foreign_emulators_dive_is_placed_right(
     shared_data: Path, site: str, stations: int, median_m: float
-):
+) -> None:
     truth = json.loads((shared_data / "dives" / f"{site}.truth.json").read_text())["stations"]
     builder, config = ScanBuilder(Map()), Map()
     scans = [scan for r in readings_of(shared_data / "dives" / f"{site}.jsonl.gz") for scan in builder.push(r)]
