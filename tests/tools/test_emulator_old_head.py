@@ -16,7 +16,7 @@ from drivers.tritech.framing import Deframer
 from drivers.tritech.headdata import Control, HeadData, HeadStatus, decode_head_data
 from drivers.tritech.messages import Alive, AuxData, BBUserData, FpgaCalData, FpgaVersionData
 from drivers.tritech.settings import gains, head_command
-from tests.tools.test_emulator_head import MS, Bench, ramp
+from tests.tools.head_bench import MS, Bench, ramp
 from tools.emulator.dive import Dive, DiveOptions
 from tools.emulator.head import Head, HeadOptions
 from tools.emulator.line import Line

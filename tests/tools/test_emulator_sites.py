@@ -7,15 +7,13 @@ from math import radians
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from tests.tools.plans import Floats, clearance_m, edges, in_water
 from tools.emulator.fan import View
 from tools.emulator.rays import NOTHING_M, Segments, cast, trace
 from tools.emulator.scene import Scene
 from tools.emulator.site import ROCK, SITES, Site, Wall, rectangle
 from tools.emulator.site.curves import beside, smooth
-
-Floats = NDArray[np.float64]
 
 LONGEST_STEP_M = 3.0
 CLEAR_M = 0.4
@@ -31,34 +29,6 @@ SIZES = {  # what each is said to be: width, height, least number of stops
     "pool": (8.0, 5.0, 4),
     "tunnel": (44.0, 1.8, 8),
 }
-
-
-def edges(walls: tuple[Wall, ...]) -> tuple[Floats, Floats]:
-    pieces = Segments.of(walls)
-    return pieces.start, pieces.start + pieces.along
-
-
-def clearance_m(walls: tuple[Wall, ...], points: Floats) -> Floats:
-    """Distance ``(n,)`` of points to the nearest wall."""
-    pieces = Segments.of(walls)
-    arm = points[:, None] - pieces.start
-    share = np.clip((arm * pieces.along).sum(axis=2) / (pieces.along**2).sum(axis=1), 0.0, 1.0)
-    distance: Floats = np.linalg.norm(arm - share[..., None] * pieces.along, axis=2).min(axis=1)
-    return distance
-
-
-def inside(wall: Wall, points: Floats) -> NDArray[np.bool_]:
-    """Whether points lie inside a closed wall (even-odd rule)."""
-    start, end = edges((wall,))
-    x, y = points[:, :1], points[:, 1:]
-    spans = (start[:, 1] > y) != (end[:, 1] > y)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        at = start[:, 0] + (y - start[:, 1]) * (end - start)[:, 0] / (end - start)[:, 1]
-    return np.asarray((spans & (x < at)).sum(axis=1) % 2 == 1)
-
-
-def in_water(walls: tuple[Wall, ...], points: Floats) -> bool:
-    return bool(inside(walls[0], points).all()) and not any(inside(wall, points).any() for wall in walls[1:])
 
 
 def legs(site: Site) -> list[tuple[float, float, Floats]]:

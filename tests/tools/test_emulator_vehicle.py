@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tests.tools.test_emulator_sites import clearance_m, in_water
+from tests.tools.plans import clearance_m, in_water
+from tests.tools.silence import Silence
 from tools.cli import main
 from tools.emulator.echoes import Place
 from tools.emulator.site import SITES, Stop
@@ -88,7 +89,8 @@ def test_no_pilot_leaves_the_water(name: str) -> None:
         assert min(each.depth_m for each in places) > site.ceiling_m
 
 
-def test_command_takes_pilot_drift_and_compass(tmp_path: Path) -> None:
+def test_command_takes_pilot_drift_and_compass(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tools.emulator.dive.EchoModel", Silence)
     truths = []
     for number, words in enumerate((["--pilot", "steady"], ["--pilot", "restless", "--drift-m-s", "0.01"])):
         out, truth = tmp_path / f"{number}.jsonl", tmp_path / f"{number}.json"
