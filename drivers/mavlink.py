@@ -27,6 +27,8 @@ _V2: Final = 0xFD
 _START: Final = re.compile(rb"[\xfd\xfe]")
 _SIGNED: Final = 1
 _SIGNATURE: Final = 13
+_EXTENSION: Final = 16
+"""Bytes that newer programs may have added to a message: none of those known here has gained more than four."""
 _AUTOPILOT: Final = 1
 """Component number of an autopilot."""
 
@@ -83,7 +85,7 @@ def judge(buffer: bytearray, at: int, is_synced: bool) -> int | str:
     layout = LAYOUTS.get(number)
     if layout is None:
         return _judge_unknown(buffer, at + size, size, is_synced)
-    if is_v1 and buffer[at + 1] != layout.size:
+    if buffer[at + 1] != layout.size if is_v1 else buffer[at + 1] > layout.size + _EXTENSION:
         return ""
     if len(buffer) < at + unsigned:
         return MORE

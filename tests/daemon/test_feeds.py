@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import os
+import socket
 import struct
 import threading
+import time
 import tty
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,7 +22,8 @@ from daemon.pipeline import Pipeline
 from drivers.keller import initialise, read_channel, with_crc
 from drivers.log import read_log
 from drivers.records import Chunk, Event
-from tests.daemon.rig import Rig, configuration
+from tests.daemon.rig import Rig, configuration, free_ports
+from tests.drivers.feedframes import attitude, mavlink2
 
 SECOND = 1_000_000_000
 COMPASS = Feed(name="compass", port="socket://a:1", provides=("heading",))
@@ -135,6 +138,28 @@ def rig(tmp_path: Path) -> Iterator[Rig]:
 def depth_feed(rig: Rig) -> dict[str, Any]:
     found: dict[str, Any] = rig.health().get("ports", {}).get("depth", {})
     return found
+
+
+def test_a_vehicle_is_heard_over_the_network(rig: Rig) -> None:
+    silent, host = os.openpty()
+    (udp,) = free_ports(1)
+    path = configuration(rig.folder, os.ttyname(host), rig.ports)
+    path.write_text(path.read_text() + f'[[feed]]\nname = "rov"\ndriver = "mavlink"\nport = "udp://:{udp}"\n')
+    rig.run(path)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle:
+
+        def is_heard() -> bool:
+            now_ms = time.monotonic_ns() // 1_000_000 % 2**32
+            vehicle.sendto(mavlink2(30, attitude(1.0, now_ms)), ("127.0.0.1", udp))
+            return bool(rig.health().get("ports", {}).get("rov", {}).get("quality", {}).get("good", 0) > 5)
+
+        rig.wait(is_heard)
+    assert rig.health()["ports"]["rov"]["stale"] == ["depth"]
+    rig.stop()
+    os.close(host)
+    os.close(silent)
+    raw = b"".join(each.data for each in read_log(rig.logs) if isinstance(each, Chunk) and each.port == "rov")
+    assert raw.count(b"\xfd") > 5
 
 
 def test_a_polled_sensor_and_its_tare_survive_the_acquisition(rig: Rig, sensor: Sensor) -> None:

@@ -127,6 +127,13 @@ def test_unknown_messages_are_skipped_whole_between_frames() -> None:
     assert run(LINE, [(0, unknown[3:] + known)])[1].frames["ATTITUDE"] == 2
 
 
+def test_a_message_may_have_grown_but_not_beyond_reason() -> None:
+    grown, absurd = attitude(1.0).ljust(40, b"x"), attitude(1.0).ljust(60, b"x")
+    readings, counters = run(LINE, [(0, mavlink2(30, grown) + mavlink2(30, absurd))])
+    assert [plain(each)[1] for each in readings] == pytest.approx([math.degrees(1.0)], abs=1e-4)
+    assert counters.skipped_bytes == 12 + 60
+
+
 @pytest.mark.parametrize("index", [1, 4, 5, 8, 12, 20, 36])
 def test_a_damaged_frame_is_refused_and_the_next_one_read(index: int) -> None:
     frame = mavlink2(30, attitude(1.0))

@@ -12,6 +12,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from config.errors import PortError
 from config.schema import Config
@@ -90,6 +92,12 @@ def test_a_line_at_a_wrong_baud_rate_is_nobody(shared_data: Path) -> None:
     wrong = bytes(int(doubled[at + 1 : at + 9][::-1], 2) for at in range(0, len(doubled) - 10, 10))
     assert identify([(0, wrong)]) == []
     assert identify([(0, b"")]) == identify([]) == []
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.binary(max_size=2000))
+def test_noise_never_raises(data: bytes) -> None:
+    assert all(0 <= each.share <= 1 for each in identify([(0, data)]))
 
 
 class Line:
