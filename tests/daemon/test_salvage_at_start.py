@@ -9,10 +9,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from rig import Rig, configuration
 
 from drivers.log import read_log
 from drivers.records import Event
+from tests.daemon.rig import Rig, configuration
 
 
 @pytest.fixture

@@ -7,13 +7,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from rig import Rig, configuration
 
 from config.schema import Sonar
 from drivers.log import read_log
 from drivers.readings import Ping
 from drivers.records import Chunk, Event, Record
 from drivers.tritech.decoder import TritechDecoder
+from tests.daemon.rig import Rig, configuration
 
 
 @pytest.fixture
