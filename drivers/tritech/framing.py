@@ -149,7 +149,7 @@ class Deframer:
 
     def _flaw(self, at: int, size: int, held: int) -> str | None:
         start = bytes(self._buffer[at : at + min(held, size, STAGES[-1])])
-        is_quick = self._times[-1] - self._times[0] <= self._limit_ns(size)
+        is_quick = self._times[-1] - self._time(at) <= self._limit_ns(size)
         reason = flaw(start, size) if is_quick else self._slow_flaw(at, start, size, held)
         if reason is not None:
             return reason
