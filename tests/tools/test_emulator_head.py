@@ -29,7 +29,7 @@ from drivers.tritech.messages import Alive, BBUserData, HeadInf, Message, Versio
 from drivers.tritech.settings import head_command
 from tests.tools.head_bench import MS, PARAMETERS, Bench, ramp
 from tools.emulator.head import Head, HeadOptions
-from tools.emulator.sweep import DstSweep
+from tools.emulator.sweep import Sweep
 
 
 def infos(heard: list[tuple[int, Message]]) -> list[int]:
@@ -132,7 +132,7 @@ def test_sector_sweeps_as_a_real_head_did(shared_data: Path) -> None:
         real = list(csv.DictReader(file))
     wanted = [(int(row["bearing"]), int(row["sweep_code"]), bool(int(row["hdctrl"]) & 4)) for row in real]
     parameters = replace(PARAMETERS, control=Control(0x2309), left_limit=1778, right_limit=4622, step=32)
-    sweep = DstSweep()
+    sweep = Sweep()
     sweep.bearing = wanted[0][0]
     sweep.limit(parameters)
     beams = [sweep.next(parameters) for _ in wanted]

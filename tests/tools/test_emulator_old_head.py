@@ -22,7 +22,7 @@ from tools.emulator.head import Head, HeadOptions
 from tools.emulator.line import Line
 from tools.emulator.record import record
 from tools.emulator.site import SITES
-from tools.emulator.sweep import OldSweep
+from tools.emulator.sweep import Sweep
 from tools.emulator.vehicle import VehicleOptions
 
 OLD = HeadOptions(dst=False)
@@ -39,7 +39,7 @@ def real_replies(shared_data: Path) -> list[HeadData]:
 def test_sector_sweeps_as_a_real_seaking_did(shared_data: Path) -> None:
     real = real_replies(shared_data)
     wanted = [(each.bearing, each.sweep, Control.SCAN_RIGHT in each.control) for each in real]
-    sweep = OldSweep()
+    sweep = Sweep(dst=False)
     sweep.limit(SECTOR)
     sweep.bearing, sweep.clockwise = wanted[0][0], wanted[0][2]
     beams = [sweep.next(SECTOR) for _ in wanted]

@@ -35,7 +35,7 @@ from drivers.tritech.headdata import HeadStatus
 from drivers.tritech.messages import Alive, AuxData, HeadInf, Message, VersionData, encode
 from tools.emulator.line import Line, Wire
 from tools.emulator.replies import SERIAL, greeting, reply, with_gains
-from tools.emulator.sweep import DstSweep, OldSweep, Sweep
+from tools.emulator.sweep import Sweep
 
 SECOND_NS: Final = 1_000_000_000
 OVERHEAD_NS: Final = 10_000_000
@@ -104,7 +104,7 @@ class Head:
         self._listen = listen
         self._aux = aux
         self._line = line or Line(self.options.baud)
-        self._sweep: Sweep = DstSweep() if self.options.dst else OldSweep()
+        self._sweep = Sweep(dst=self.options.dst)
         self._dark_until_ns: int | None = None
         self._next_aux_ns = t_ns
         self._reboot(t_ns)

@@ -128,13 +128,17 @@ class Emulation:
             self._tell({"event": "station", "station": self.dive.vehicle.index, "of": total, "t_s": t_s})
 
 
-def spawn(folder: Path, site: str, seed: int, speed: float, stations: int | None, truth: Path | None) -> Popen[str]:
+def spawn(
+    folder: Path, site: str, seed: int, speed: float, stations: int | None, truth: Path | None, *more: str
+) -> Popen[str]:
     """Start an emulation as a process of its own; its standard output has the events as JSON lines.
 
-    The first line, ``ready``, comes when the ports are open.  End it with ``terminate()``.
+    ``more`` are further words of `lacuna emulate`, as ``--faults FILE``.  The first line, ``ready``, comes when the
+    ports are open.  End it with ``terminate()``.
     """
     words = [sys.executable, "-m", "tools.cli", "emulate", "--json", "--folder", str(folder), "--site", site]
     words += ["--seed", str(seed), "--speed", str(speed)]
     words += [] if stations is None else ["--stations", str(stations)]
     words += [] if truth is None else ["--truth", str(truth)]
+    words += more
     return Popen(words, stdout=PIPE, text=True)  # noqa: S603 - our own program with our own words

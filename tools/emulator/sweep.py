@@ -6,7 +6,7 @@ Angles in 1/16 gradian: 6400 to the turn, 3200 ahead, growing clockwise.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Final
 
 from drivers.tritech.commands import HeadParameters
 from drivers.tritech.headdata import Control
@@ -27,30 +27,19 @@ class Beam:
     sweep: int
 
 
-class Sweep(Protocol):
-    """The motor's place and direction."""
+class Sweep:
+    """The motor's place and direction.
 
-    bearing: int
+    A DST head goes round clockwise, and to and fro by whole steps from the right limit, meeting each limit once.  An
+    older head, as recorded from a SeaKing, goes round as it is told; its bearings are multiples of the step, so that
+    the outermost may lie a step outside the left limit, the beam at an end is made once for each direction, and the
+    sweep code is never told.
+    """
 
-    def centre(self) -> None:
-        """Turn ahead, as after power came."""
-
-    def reverse(self) -> None:
-        """Turn the other way from here."""
-
-    def limit(self, settings: HeadParameters) -> None:
-        """Obey new settings."""
-
-    def next(self, settings: HeadParameters) -> Beam:
-        """Step once and return the beam there."""
-
-
-class DstSweep:
-    """A DST head's sweep."""
-
-    def __init__(self) -> None:
+    def __init__(self, *, dst: bool = True) -> None:
         self.bearing = AHEAD
         self.clockwise = True
+        self._dst = dst
         self._fresh = True
 
     def centre(self) -> None:
@@ -63,11 +52,15 @@ class DstSweep:
 
     def limit(self, settings: HeadParameters) -> None:
         """Obey new settings: a transducer outside a sector goes to the sector's nearer limit."""
-        if settings.control & Control.CONTINUOUS or _inside(self.bearing, settings):
+        if not self._dst:
+            self.clockwise = bool(settings.control & Control.SCAN_RIGHT)
+            self.bearing = self.bearing // settings.step * settings.step
+        left, span = _ends(settings, dst=self._dst)
+        if settings.control & Control.CONTINUOUS or (self.bearing - left) % TURN <= span:
             return
-        to_left = min((self.bearing - settings.left_limit) % TURN, (settings.left_limit - self.bearing) % TURN)
-        to_right = min((self.bearing - settings.right_limit) % TURN, (settings.right_limit - self.bearing) % TURN)
-        self.bearing = settings.left_limit if to_left <= to_right else settings.right_limit
+        right = (left + span) % TURN
+        to_left, to_right = (min((self.bearing - end) % TURN, (end - self.bearing) % TURN) for end in (left, right))
+        self.bearing = left if to_left <= to_right else right
         self.clockwise = to_left <= to_right
         self._fresh = True
 
@@ -77,19 +70,16 @@ class DstSweep:
         self._fresh = False
         if settings.control & Control.STARE:
             self.bearing = settings.left_limit
-            return Beam(self.bearing, self.clockwise, NORMAL)
-        if settings.control & Control.CONTINUOUS:
+        elif settings.control & Control.CONTINUOUS:
             self.bearing = (self.bearing + (step if self.clockwise else -step)) % TURN
-            return Beam(self.bearing, self.clockwise, NORMAL)
-        return self._within(settings, step)
+        else:
+            return self._within(settings, step) if self._dst else self._between(settings, step)
+        return Beam(self.bearing, self.clockwise, NORMAL)
 
     def _within(self, settings: HeadParameters, step: int) -> Beam:
-        """Step to and fro: beams lie whole steps from the right limit both ways, and each limit is met once.
-
-        So do real DST heads; the reply at a limit already tells the direction of the way back.
-        """
-        span = (settings.right_limit - settings.left_limit) % TURN
-        place = (self.bearing - settings.left_limit) % TURN
+        """Step a DST head to and fro; the reply at a limit already tells the direction of the way back."""
+        left, span = _ends(settings, dst=True)
+        place = (self.bearing - left) % TURN
         if step:
             from_right = span - place
             if self.clockwise:
@@ -97,7 +87,7 @@ class DstSweep:
             else:
                 from_right = min(span, (from_right // step + 1) * step)
             place = span - from_right
-        self.bearing = (settings.left_limit + place) % TURN
+        self.bearing = (left + place) % TURN
         if place == span:
             self.clockwise = False
             return Beam(self.bearing, self.clockwise, AT_RIGHT)
@@ -106,61 +96,21 @@ class DstSweep:
             return Beam(self.bearing, self.clockwise, AT_LEFT)
         return Beam(self.bearing, self.clockwise, NORMAL)
 
-
-class OldSweep:
-    """The sweep of a head that is not DST, as recorded from a SeaKing.
-
-    Bearings are multiples of the step, so that the outermost ones may lie a step outside the left limit; a beam at an
-    end is made twice, once for each direction; the sweep code is never told.
-    """
-
-    def __init__(self) -> None:
-        self.bearing = AHEAD
-        self.clockwise = True
-        self._fresh = True
-
-    def centre(self) -> None:
-        """Turn ahead, as after power came."""
-        self.bearing, self.clockwise, self._fresh = AHEAD, True, True
-
-    def reverse(self) -> None:
-        """Turn the other way from here."""
-        self.clockwise = not self.clockwise
-
-    def limit(self, settings: HeadParameters) -> None:
-        """Obey new settings, the direction among them; a transducer outside a sector goes to its left end."""
-        self.clockwise = bool(settings.control & Control.SCAN_RIGHT)
-        self.bearing = self.bearing // settings.step * settings.step
-        self._fresh = True
-        first, span = _ends(settings)
-        if not settings.control & Control.CONTINUOUS and (self.bearing - first) % TURN > span:
-            self.bearing, self.clockwise = first, True
-
-    def next(self, settings: HeadParameters) -> Beam:
-        """Step once and return the beam there; an end is answered where it stands before the way back begins."""
-        if settings.control & Control.STARE:
-            self.bearing = settings.left_limit
-        elif self._fresh:
-            self._fresh = False
-        elif settings.control & Control.CONTINUOUS:
-            self.bearing = (self.bearing + (settings.step if self.clockwise else -settings.step)) % TURN
+    def _between(self, settings: HeadParameters, step: int) -> Beam:
+        """Step an older head to and fro; it turns where it stands and pings there once more."""
+        left, span = _ends(settings, dst=False)
+        place = (self.bearing - left) % TURN + (step if self.clockwise else -step)
+        if 0 <= place <= span:
+            self.bearing = (left + place) % TURN
         else:
-            first, span = _ends(settings)
-            place = (self.bearing - first) % TURN + (settings.step if self.clockwise else -settings.step)
-            if 0 <= place <= span:
-                self.bearing = (first + place) % TURN
-            else:
-                self.clockwise = not self.clockwise
+            self.clockwise = not self.clockwise
         return Beam(self.bearing, self.clockwise, NORMAL)
 
 
-def _ends(settings: HeadParameters) -> tuple[int, int]:
-    """Return the first bearing of an old head's sector and how far it is to the last, both whole steps."""
-    step = settings.step
-    first = settings.left_limit // step * step
-    span = (settings.right_limit - settings.left_limit) % TURN + settings.left_limit - first
-    return first, span // step * step
-
-
-def _inside(bearing: int, settings: HeadParameters) -> bool:
-    return (bearing - settings.left_limit) % TURN <= (settings.right_limit - settings.left_limit) % TURN
+def _ends(settings: HeadParameters, *, dst: bool) -> tuple[int, int]:
+    """Return the first bearing of a sector and how far it is from there to the last."""
+    left, span = settings.left_limit, (settings.right_limit - settings.left_limit) % TURN
+    if dst:
+        return left, span
+    before = left % settings.step
+    return left - before, (span + before) // settings.step * settings.step
