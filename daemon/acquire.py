@@ -15,6 +15,8 @@ from dataclasses import asdict
 from importlib.metadata import version
 from typing import Any, Final
 
+from pydantic import ValidationError
+
 from config.errors import DataError, LacunaError, PortError
 from config.schema import Sonar
 from daemon import snapshots
@@ -56,6 +58,7 @@ class Acquisition:
         self._lines = _lines(job)
         self._pollers = {feed.name: Poller(feed) for feed in job.config.feed if feed.poll}
         self._told_ns = 0
+        self._apply(job.settings)
         try:
             self._open(must=job.is_first)
             self._recorder = self._start_log()
@@ -158,7 +161,7 @@ class Acquisition:
         do, fields = command["do"], command["fields"]
         error: str | None = None
         if do == "sonar":
-            self._set_sonar(fields)
+            error = self._set_sonar(fields)
         elif do == "tare":
             error = self._tare(fields)
         elif do != "save":
@@ -177,10 +180,20 @@ class Acquisition:
         self._beams.tare(tare.port, tare.surface_mbar)
         return None
 
-    def _set_sonar(self, fields: dict[str, Any]) -> None:
+    def _set_sonar(self, fields: dict[str, Any]) -> str | None:
+        """Set the sonar and record it; return why that is not possible, or None."""
+        try:
+            self._apply(fields)
+        except ValidationError as error:
+            first = error.errors(include_url=False)[0]
+            return f"the sonar cannot be set so: {'.'.join(map(str, first['loc']))}: {first['msg']}"
+        self._recorder.event("settings", fields)
+        return None
+
+    def _apply(self, fields: dict[str, Any]) -> None:
+        """Set the sonar; raise ValidationError, with nothing changed, where it cannot be set so."""
         changed = {key: value for key, value in fields.items() if key not in ("start", "stop")}
         self._sonar = Sonar.model_validate(self._sonar.model_dump() | changed)
-        self._recorder.event("settings", fields)
         if changed:
             self._head.change(self._sonar)
         if fields.get("start"):

@@ -11,13 +11,15 @@ from pathlib import Path
 
 from config.schema import Config
 from daemon.clock import Clock
+from drivers.records import Json
 
 
 @dataclass(frozen=True, slots=True)
 class Job:
     """``link`` is the supervisor's socket; ``is_first`` is false for a child that takes over from one that died.
 
-    ``surfaces_mbar``: pressures at the surface, by feed, that the operator has taken in this session.
+    ``surfaces_mbar``: pressures at the surface, by feed, that the operator has taken in this session; ``settings``:
+    how the operator has set the sonar since its start, as the request ``sonar`` says it.
     """
 
     link: str
@@ -26,6 +28,7 @@ class Job:
     clock: Clock
     is_first: bool
     surfaces_mbar: dict[str, float] = field(default_factory=dict)
+    settings: dict[str, Json] = field(default_factory=dict)
 
     @property
     def folder(self) -> Path:
@@ -42,6 +45,7 @@ class Job:
             "origin_ns": list(self.clock.origin_ns),
             "is_first": self.is_first,
             "surfaces_mbar": self.surfaces_mbar,
+            "settings": self.settings,
         }
         return json.dumps(body).encode() + b"\n"
 
@@ -51,4 +55,5 @@ def read_job(line: bytes) -> Job:
     body = json.loads(line)
     clock = Clock(body["rate"], tuple(body["origin_ns"]))
     config = Config.model_validate(body["config"])
-    return Job(body["link"], body["session"], config, clock, body["is_first"], body["surfaces_mbar"])
+    carried = body["surfaces_mbar"], body["settings"]
+    return Job(body["link"], body["session"], config, clock, body["is_first"], *carried)

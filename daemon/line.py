@@ -48,7 +48,10 @@ class Line:
         return self._port is None and t_ns >= self._retry_ns
 
     def try_again(self, t_ns: int) -> bool:
-        """Try to open a lost port; say whether it worked.  Each failure doubles the wait, up to 1.6 s: a port is back within 2 s."""
+        """Try to open a lost port; say whether it worked.
+
+        Each failure doubles the wait, up to 1.6 s: a port is back within 2 s of its return.
+        """
         try:
             self.open()
         except PortError:

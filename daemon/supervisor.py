@@ -34,6 +34,7 @@ from daemon.job import Job
 from daemon.link import ANSWER, FATAL, NOTE, READY, SAY
 from daemon.status import Status
 from daemon.wire import head
+from drivers.records import Json
 
 _LOOK_S: Final = 0.05
 _STOP_S: Final = 2.0
@@ -72,6 +73,7 @@ class Supervisor:
         self._is_ready = False
         self._fatal: LacunaError | None = None
         self._surfaces_mbar: dict[str, float] = {}
+        self._settings: dict[str, Json] = {}
 
     def run(self) -> Outcome:
         """Run until SIGINT or SIGTERM.
@@ -142,7 +144,8 @@ class Supervisor:
         return any(not part.name.startswith(f"{self.session}-") for part in parts)
 
     def _job(self, is_first: bool) -> Job:
-        return Job(self._address, self.session, self._config, self._clock, is_first, dict(self._surfaces_mbar))
+        carried = dict(self._surfaces_mbar), dict(self._settings)
+        return Job(self._address, self.session, self._config, self._clock, is_first, *carried)
 
     def _hear(self) -> None:
         """Take what the children said."""
@@ -175,6 +178,10 @@ class Supervisor:
         kind, fields = header["kind"], header["fields"]
         if kind == "tare":
             self._surfaces_mbar[fields["port"]] = fields["surface_mbar"]
+        if kind == "settings":
+            # Of start and stop the newest counts.
+            kept = {name: value for name, value in self._settings.items() if name not in ("start", "stop")}
+            self._settings = (kept if {"start", "stop"} & set(fields) else self._settings) | fields
         if kind in ("port_lost", "disk") or (kind == "port_opened" and self._status.has_lost(fields["port"])):
             self._say(" ".join([kind, *(f"{key}={value}" for key, value in fields.items())]))
 

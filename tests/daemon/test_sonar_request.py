@@ -46,12 +46,28 @@ def test_the_sonar_is_set_while_it_scans(rig: Rig) -> None:
     rig.wait(lambda: rig.count("ping") > before + 60 and rig.health()["sonar"]["s_per_revolution"] is not None)
     assert rig.health()["sonar"]["limited_by"] in ("line", "sound", "other")
     assert rig.ask(id=4, do="sonar", gain_pct=700.0)["error"]["code"] == "invalid"
+    assert "range_m" in rig.ask(id=5, do="sonar", range_m=None)["error"]["message"]
     rig.stop()
     records = list(read_log(rig.logs))
     kinds = [record.kind for record in records if isinstance(record, Event)]
     assert (kinds.count("started"), kinds.count("settings"), kinds.count("port_lost")) == (1, 3, 0)
     assert len(list(rig.logs.iterdir())) == 1, "the log went on"
     assert_settings(records)
+
+
+def test_settings_outlive_the_acquisition(rig: Rig) -> None:
+    rig.emulate(speed=4.0, stations=1)
+    rig.run(configuration(rig.folder, rig.folder / "ports" / "sonar", rig.ports), rate=4.0)
+    rig.wait(lambda: rig.count("ping") > 5)
+    assert rig.ask(id=1, do="sonar", stop=True)["ok"] is True
+    assert rig.ask(id=2, do="sonar", start=True, gain_pct=70.0)["ok"] is True
+    rig.wait(lambda: newest(rig)["gain_pct"] == pytest.approx(70.0, abs=0.5))
+    rig.kill("acquire")
+    before = rig.count("ping")
+    rig.wait(lambda: rig.count("ping") > before + 20)
+    assert newest(rig)["gain_pct"] == pytest.approx(70.0, abs=0.5)
+    assert rig.health()["sonar"]["gain_pct"] == 70.0
+    rig.stop()
 
 
 def assert_settings(records: list[Record]) -> None:

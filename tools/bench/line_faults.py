@@ -52,11 +52,11 @@ class Faulty:
         self._commit(self.generator.choice(FAULTS), now_s)
 
     def came_back(self, at_s: float) -> None:
-        """Note that the port was opened again."""
+        """Note that the port was opened again, if that was waited for."""
         if self.returned_s is not None:
             self.back_s.append(at_s - self.returned_s)
             self.returned_s = None
-        self._speak()
+            self._speak()
 
     def _commit(self, fault: str, now_s: float) -> None:
         lasting_s = self.generator.uniform(2.0, 4.0) if self.generator.random() < _LONG else 0.0
