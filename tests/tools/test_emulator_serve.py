@@ -72,7 +72,7 @@ def event(process: Popen[str]) -> dict[str, object]:
 @pytest.fixture
 def served(tmp_path: Path) -> Iterator[tuple[Path, Popen[str]]]:
     folder = tmp_path / "ports"
-    process = spawn(folder, "keyhole", 1, SPEED, 1, tmp_path / "truth.json")
+    process = spawn(folder, "keyhole", 1, SPEED, 1, tmp_path / "truth.json", "--pilot", "restless")
     try:
         assert event(process) == {"event": "ready", "sonar": str(folder / "sonar"), "feed": str(folder / "feed")}
         yield folder, process
