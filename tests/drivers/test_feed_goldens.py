@@ -1,7 +1,7 @@
-"""Logs of real instruments, read sentence by sentence: every reading as it was checked by eye once, and every count.
+"""Logs of real instruments, read sentence by sentence: every reading and every count as it stands in the golden file.
 
-The logs are those of the gpsd regression tests (sounder, Humminbird, pypilot, True North, B&G); what stands here is
-what their sentences say.
+The logs are those of the gpsd regression tests (sounder, Humminbird, pypilot, True North, B&G); the
+golden values were compared once with the bare fields of their sentences.
 """
 
 from __future__ import annotations
