@@ -11,21 +11,21 @@ from typing import Final, Protocol, cast
 from config.errors import LacunaError, UsageError
 
 COMMANDS: Final[dict[str, tuple[str, str]]] = {
+    "run": ("tools.run", "the daemon: record, map, publish"),
+    "demo": ("tools.demo", "an emulated dive, the real daemon on it, and the live page"),
+    "replay": ("tools.replay", "map recorded logs as if they were live"),
+    "fill": ("tools.fill_map", "fill the holes of a ROS map_server map"),
     "import": ("tools.import_log", "a foreign recording as a log"),
     "info": ("tools.info", "what is in a log"),
     "salvage": ("tools.salvage", "what can be read of a broken log, into a new one"),
-    "emulate": ("tools.emulate", "an emulated vehicle on two pseudo-terminals, or recorded to a file"),
-    "view": ("tools.view", "the mesh in an Open3D window"),
     "dashboard": ("tools.dashboard_command", "the live page in a browser"),
-    "fill": ("tools.fill_map", "fill the holes of a ROS map_server map"),
-    "probe": ("tools.probe", "what speaks on a port, at which baud rate"),
+    "view": ("tools.view", "the mesh in an Open3D window"),
     "ports": ("tools.ports", "the serial ports of this machine"),
+    "probe": ("tools.probe", "what speaks on a port, at which baud rate"),
     "check-config": ("tools.check_config", "say every mistake of a configuration file"),
-    "replay": ("tools.replay", "map recorded logs as if they were live"),
-    "run": ("tools.run", "the daemon: record, map, publish"),
     "keygen": ("tools.keygen", "make keys for a daemon that other machines reach"),
+    "emulate": ("tools.emulate", "an emulated vehicle on two pseudo-terminals, or recorded to a file"),
     "bench": ("tools.bench_command", "the figures of the README, measured anew"),
-    "demo": ("tools.demo", "an emulated dive, the real daemon on it, and the live page"),
 }
 """Name of each command, its module, and what it does in one line."""
 

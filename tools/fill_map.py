@@ -35,7 +35,7 @@ def run(args: argparse.Namespace) -> int:
     read = read_map(args.map)
     state = fill_map(read, config)
     site = config.site.name if args.config else args.map.stem
-    facts = write_outputs(args.out, state, _origin(read, args.map, config, site), read.yaw_rad)
+    facts = write_outputs(args.out, state, _origin(read, args.map, config, site), read.yaw_rad, poses=False)
     print(json.dumps(facts, indent=2, sort_keys=True) if args.json else _summary(state, args.out))
     return 0
 

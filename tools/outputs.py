@@ -31,18 +31,22 @@ _FILL_DARKEST: Final = 5  # a filled cell is never as black as a measured one, a
 _FILL_PALEST: Final = 85
 
 
-def write_outputs(folder: Path, state: MapState, origin: Provenance, yaw_rad: float = 0.0) -> dict[str, Json]:
+def write_outputs(
+    folder: Path, state: MapState, origin: Provenance, yaw_rad: float = 0.0, *, poses: bool = True
+) -> dict[str, Json]:
     """Write the results of design section 5 into ``folder`` and return what ``report.json`` says.
 
-    ``yaw_rad`` is the turn of a foreign map's axes, carried over into the .yaml files.  Results of an earlier run are
-    replaced, each file whole.  Raises InputError (no such folder) or LogError (the disk is full, or it is read-only).
+    ``yaw_rad`` is the turn of a foreign map's axes, carried over into the .yaml files; a foreign map has no
+    ``poses``.  Results of an earlier run are replaced, each file whole.  Raises InputError (no such folder) or
+    LogError (the disk is full, or it is read-only).
     """
     make_folder(folder)
     write_map(folder, "map", state.grid, state_shades(state.grid.state), yaw_rad)
     write_map(folder, "filled", state.grid, fill_shades(state.filled), yaw_rad)
     replace_file(folder / "fills.csv", fills_csv(state.filled))
     replace_file(folder / "holes.csv", holes_csv(state.filled))
-    replace_file(folder / "poses.csv", poses_csv(state.stations))
+    if poses:
+        replace_file(folder / "poses.csv", poses_csv(state.stations))
     replace_file(folder / "mesh.ply", ply_bytes(state.mesh, (origin.site, origin.line)))
     plan = draw_plan(state.filled, state.stations, origin)
     replace_file(folder / "plan.png", plan.png)
