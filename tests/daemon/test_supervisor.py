@@ -112,7 +112,7 @@ def test_the_sonar_is_set_and_stopped_on_request(rig: Rig) -> None:
     assert rig.ask(id=1, do="sonar", gain_pct=30, range_m=5)["ok"] is True
     rig.wait(lambda: newest_gain_pct(rig) == pytest.approx(30, abs=1))
     assert rig.ask(id=2, do="sonar", stop=True)["ok"] is True
-    rig.wait(lambda: rig.health()["sonar"]["state"] == "stopped")
+    rig.wait(lambda: rig.health().get("sonar", {}).get("state") == "stopped")
     rig.stop()
     assert events(rig.logs).count("settings") == 2
 

@@ -48,7 +48,8 @@ class Wire:
         fresh.replace(self.link)
 
     def hang_up(self) -> None:
-        """Pull the plug: reading and writing fail at the other end."""
+        """Pull the plug: reading and writing fail at the other end, and the name is gone, as udev would have it."""
+        self.link.unlink(missing_ok=True)
         for descriptor in (self._device, self._host):
             os.close(descriptor)
         self._device = self._host = -1
@@ -73,7 +74,6 @@ class Wire:
 
     def close(self) -> None:
         """End the line."""
-        self.link.unlink(missing_ok=True)
         if self._device >= 0:
             self.hang_up()
 

@@ -21,6 +21,9 @@ FAULTS: Final = ("hang-up", "stall", "garbage", "half frame", "dropped", "double
 FEEDS: Final = {"calm": 4800, "compass": 4800, "depth": 4800, "altitude": 4800}
 _CALM: Final = "calm"
 _WAIT_S: Final = 6.0
+_HEARD_S: Final = 0.1
+"""Time to read what was said before the next fault: a hang-up takes with it what nobody has read."""
+
 _LONG: Final = 0.04
 """Share of the hang-ups and stalls that last for seconds."""
 
@@ -57,6 +60,7 @@ class Faulty:
             self.back_s.append(at_s - self.returned_s)
             self.returned_s = None
             self._speak()
+            self.until_s = time.monotonic() + _HEARD_S
 
     def _commit(self, fault: str, now_s: float) -> None:
         lasting_s = self.generator.uniform(2.0, 4.0) if self.generator.random() < _LONG else 0.0
@@ -81,7 +85,7 @@ class Faulty:
                 self.wire.write(frame[:at] + frame[at - 1 :])
             case _:
                 self.wire.write(frame[:at] + bytes((frame[at] ^ 0x10,)) + frame[at + 1 :])
-        self.until_s = max(self.until_s, now_s + 0.05)
+        self.until_s = max(self.until_s, now_s + _HEARD_S)
         self._speak()
 
     def _speak(self) -> None:
@@ -103,10 +107,10 @@ def measure(folder: Path, cycles: int) -> Iterator[Figure]:
         while sum(line.cycles for line in lines) < cycles or any(line.is_out or line.returned_s for line in lines):
             now_s = time.monotonic()
             for line in lines:
-                if line.is_out or sum(each.cycles for each in lines) < cycles:
+                if line.returned_s is not None and now_s - line.returned_s > _WAIT_S:
+                    line.came_back(now_s)  # in vain: the time it took breaks the promise
+                elif line.is_out or sum(each.cycles for each in lines) < cycles:
                     line.turn(now_s)
-                elif line.returned_s is not None and now_s - line.returned_s > _WAIT_S:
-                    line.came_back(now_s)
             calm.write(next(calm_talk))
             rig.listen(0.01)
             heard = _hear(rig, heard, {line.name: line for line in lines})
