@@ -55,8 +55,8 @@ class Candidate:
     """A way to close a hole between ends ``first`` and ``second`` (-1: the side of a wall).
 
     ``path`` ``(n, 2)`` int32 of row and column, joined edge to edge from inside the one wall to inside the other;
-    ``cells`` the same as a set, ``box`` their lowest and highest row and column; ``features`` after ``FEATURES``;
-    ``half_a``, ``half_b`` half the thickness at either end; ``start`` and ``finish`` x and y of both ends, in cells.
+    ``cells`` the same as a set; ``features`` after ``FEATURES``; ``half_a``, ``half_b`` half the thickness at either
+    end; ``start`` and ``finish`` x and y of both ends, in cells.
     """
 
     first: int
@@ -64,7 +64,6 @@ class Candidate:
     curve: str
     path: NDArray[np.int32]
     cells: frozenset[tuple[int, int]]
-    box: NDArray[np.int32]
     gap: float
     features: NDArray[np.float64]
     half_a: float
@@ -146,10 +145,9 @@ def _candidate(
     ends: tuple[End, End],
 ) -> Candidate:  # fmt: skip
     cells = frozenset((int(row), int(col)) for row, col in path)
-    box = np.concatenate([path.min(axis=0), path.max(axis=0)])
     halves = ends[0].half, ends[1].half
     places = (ends[0].x, ends[0].y), (ends[1].x, ends[1].y)
-    return Candidate(*pair, curve.name, path, cells, box, gap, features, *halves, *places)
+    return Candidate(*pair, curve.name, path, cells, gap, features, *halves, *places)
 
 
 def _meets(a: End, walls: Walls, state: NDArray[np.uint8], longest: float) -> tuple[float, float] | None:

@@ -56,10 +56,19 @@ class Belief:
 
         It never grows with distance, and stays within 2 and 98 per cent: nothing guessed is told as sure.
         """
-        weights = self.cell.weights.copy()
-        weights[2] = min(weights[2], 0.0)
-        chances = sigmoid(cell_features(np.full(len(away), chance), away) @ weights)
+        chances = self.cell.chance(cell_features(np.full(len(away), chance), away))
         return np.clip(chances, _LOWEST, _HIGHEST).astype(np.float32)
+
+
+def falling(
+    cell: Logistic, features: NDArray[np.float64], right: NDArray[np.float64], count: NDArray[np.float64]
+) -> Logistic:
+    """Return the model of cells after these outcomes; should they say that distance helps, distance does not count."""
+    taught = cell.taught(features, right, count)
+    if taught.weights[2] <= 0.0:
+        return taught
+    level = Logistic(cell.weights[:2], cell.precision[:2, :2]).taught(features[:, :2], right, count)
+    return Logistic(np.append(level.weights, 0.0), taught.precision)
 
 
 def cell_features(chance: NDArray[np.float64], away: NDArray[np.float64]) -> NDArray[np.float64]:

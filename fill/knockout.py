@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
+from scipy.spatial import cKDTree
 
 from fill.segments import EIGHT, STEPS, End, Walls
 from mapping.values import FREE, OCCUPIED, UNKNOWN
@@ -21,6 +22,7 @@ _SHORTEST: Final = 3.0
 _STUB: Final = 6  # cells of wall that stay on either side of a hole
 _APART: Final = 10  # cells between two lessons on one grid
 _TRIES: Final = 12  # starts looked at for each hole wanted
+_NARROWEST: Final = 4.0  # cells: less is no opening
 _FACING: Final = 0.8  # cosine: ends that look at each other across open water
 
 Cell = tuple[int, int]
@@ -30,13 +32,14 @@ Cell = tuple[int, int]
 class Exam:
     """A grid with ``holes`` pieces taken out.
 
-    ``state`` is what the filler will see, ``zone`` the cells about the pieces, ``rim`` the pieces and what touches
-    them, where a fill of theirs must begin or end.
+    ``state`` is what the filler will see, ``zone`` the cells about the pieces, ``wall`` the wall taken out and
+    ``water`` the water of true openings, each with a margin of two cells.
     """
 
     state: NDArray[np.uint8]
     zone: NDArray[np.bool_]
-    rim: NDArray[np.bool_]
+    wall: NDArray[np.bool_]
+    water: NDArray[np.bool_]
     holes: int
 
 
@@ -46,6 +49,7 @@ def knock_out(state: NDArray[np.uint8], walls: Walls, longest: float, count: int
     zone = np.zeros(state.shape, bool)
     for first, second in _openings(walls, state, longest, count // 4, random):
         _blank_opening(first, second, seen, zone, state, random)
+    water = _widened(seen != state)
     holes = 0
     starts = np.argwhere(walls.centre)
     for _ in range(_TRIES * count):
@@ -57,8 +61,11 @@ def knock_out(state: NDArray[np.uint8], walls: Walls, longest: float, count: int
         if path is not None and not _near(path, zone):
             _erase(path, walls, seen, zone, random)
             holes += 1
-    rim = ndimage.binary_dilation(seen != state, EIGHT, iterations=2)
-    return Exam(seen, zone, np.asarray(rim, np.bool_), holes)
+    return Exam(seen, zone, _widened((state == OCCUPIED) & (seen == UNKNOWN)), water, holes)
+
+
+def _widened(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    return np.asarray(ndimage.binary_dilation(mask, EIGHT, iterations=2), np.bool_)
 
 
 def _piece(start: Cell, centre: NDArray[np.bool_], length: int) -> list[Cell] | None:
@@ -128,17 +135,27 @@ def _openings(
     """Pairs of wall ends that look at each other across water seen free: true openings."""
     ends = walls.ends
     found = []
-    for index, a in enumerate(ends):
-        for b in ends[index + 1 :]:
-            dx, dy = b.x - a.x, b.y - a.y
-            gap = math.hypot(dx, dy)
-            if not 4.0 <= gap <= longest:
-                continue
-            facing = min(a.dx * dx + a.dy * dy, -b.dx * dx - b.dy * dy) / gap
-            if facing > _FACING and _open_between(a, b, gap, state):
-                found.append((a, b))
+    for first, second in _facing_pairs(ends, longest):
+        a, b = ends[first], ends[second]
+        gap = math.hypot(b.x - a.x, b.y - a.y)
+        if gap >= _NARROWEST and _open_between(a, b, gap, state):
+            found.append((a, b))
     chosen = random.permutation(len(found))[:count]
     return [found[int(index)] for index in chosen]
+
+
+def _facing_pairs(ends: tuple[End, ...], longest: float) -> list[tuple[int, int]]:
+    """Pairs of ends, by their indices, that look straight at each other over up to ``longest`` cells."""
+    if len(ends) < 2:
+        return []
+    places = np.array([(end.x, end.y) for end in ends])
+    aims = np.array([(end.dx, end.dy) for end in ends])
+    pairs = np.sort(cKDTree(places).query_pairs(longest, output_type="ndarray"), axis=1)
+    a, b = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))].T
+    apart = places[b] - places[a]
+    gap = np.maximum(np.hypot(apart[:, 0], apart[:, 1]), 1e-9)
+    facing = np.minimum(np.sum(apart * aims[a], axis=1), -np.sum(apart * aims[b], axis=1)) / gap > _FACING
+    return list(zip(a[facing].tolist(), b[facing].tolist(), strict=True))
 
 
 def _open_between(a: End, b: End, gap: float, state: NDArray[np.uint8]) -> bool:

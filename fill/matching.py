@@ -39,8 +39,7 @@ def candidates(walls: Walls, state: NDArray[np.uint8], longest: float) -> list[C
 def assign(found: Sequence[Candidate], gains: Sequence[float]) -> list[int]:
     """Return the candidates to take: each end once, no crossings, the greatest sum of ``gains`` above 0."""
     live = [index for index, gain in enumerate(gains) if gain > 0]
-    rivals = {index: {other for other in live if other != index and _conflict(found[index], found[other])}
-              for index in live}  # fmt: skip
+    rivals = _rivals(live, found)
     taken: list[int] = []
     left = set(live)
     for index in live:
@@ -81,12 +80,21 @@ def _pairs(walls: Walls, longest: float) -> list[tuple[int, int]]:
     return kept
 
 
-def _conflict(one: Candidate, other: Candidate) -> bool:
-    if one.first in (other.first, other.second) or (one.second >= 0 and one.second in (other.first, other.second)):
-        return True
-    low = np.maximum(one.box[:2], other.box[:2])
-    high = np.minimum(one.box[2:], other.box[2:])
-    return bool(np.all(low <= high)) and not one.cells.isdisjoint(other.cells)
+def _rivals(live: Sequence[int], found: Sequence[Candidate]) -> dict[int, set[int]]:
+    """Return for each candidate those that share an end or a cell with it."""
+    claims: dict[int | tuple[int, int], list[int]] = {}
+    for index in live:
+        each = found[index]
+        for claim in (*each.cells, each.first, *((each.second,) if each.second >= 0 else ())):
+            claims.setdefault(claim, []).append(index)
+    rivals: dict[int, set[int]] = {index: set() for index in live}
+    for claimants in claims.values():
+        if len(claimants) > 1:
+            for index in claimants:
+                rivals[index].update(claimants)
+    for index in live:
+        rivals[index].discard(index)
+    return rivals
 
 
 def _group(start: int, rivals: dict[int, set[int]]) -> set[int]:

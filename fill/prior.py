@@ -14,27 +14,27 @@ from fill.candidates import FEATURES
 from fill.certainty import Belief, Logistic
 
 _HOLE: Final = {
-    "one": (0.52, 0.67),
-    "log gap": (0.08, 0.20),
-    "bend": (1.17, 0.42),
-    "turn": (0.13, 0.28),
-    "offset": (-1.73, 0.23),
-    "half": (0.70, 0.80),
-    "log support": (0.40, 0.14),
-    "wander": (-0.62, 0.28),
-    "near both": (-0.18, 0.62),
-    "near one": (1.40, 0.36),
-    "water both": (-1.08, 0.58),
-    "water one": (-0.38, 0.37),
-    "divides": (0.47, 0.48),
-    "water both, divides": (1.35, 0.72),
-    "snug": (1.03, 0.56),
-    "corner": (0.91, 0.35),
-    "side": (-1.57, 0.26),
-    "specks": (0.81, 0.67),
-    "detour": (-1.08, 0.71),
+    "one": (1.16, 0.71),
+    "log gap": (-0.28, 0.23),
+    "bend": (0.83, 0.44),
+    "turn": (0.23, 0.31),
+    "offset": (-1.61, 0.26),
+    "half": (0.38, 0.82),
+    "log support": (0.51, 0.15),
+    "wander": (-0.47, 0.36),
+    "near both": (0.38, 0.68),
+    "near one": (1.15, 0.38),
+    "water both": (-0.55, 0.64),
+    "water one": (0.07, 0.40),
+    "divides": (0.27, 0.53),
+    "water both, divides": (1.20, 0.77),
+    "snug": (0.79, 0.61),
+    "corner": (0.75, 0.38),
+    "side": (-1.61, 0.30),
+    "specks": (0.96, 0.76),
+    "detour": (-1.11, 0.74),
 }
-_CELL: Final = ((1.14, 0.24), (0.85, 0.10), (0.04, 0.15))
+_CELL: Final = ((1.15, 0.12), (0.79, 0.09), (0.00, 0.15))
 
 
 def prior() -> Belief:

@@ -24,6 +24,8 @@ EIGHT: Final = np.ones((3, 3), np.int8)
 SUPPORT: Final = 14
 """How many cells of centre line behind an end tell its direction."""
 _WEIGHTS: Final = np.linspace(1.0, 0.4, SUPPORT + 1)  # the nearest part of a wall tells most about its direction
+_BENDABLE: Final = 10  # cells of centre line from which a bend can be told
+_CLEARLY: Final = 0.5
 _SPUR_ROUNDS: Final = 2
 _SOLID: Final = 8.0  # cells from the nearest water: deeper is not wall but the ground behind it
 
@@ -145,8 +147,7 @@ def _end(at: int, lines: CentreLines, half: NDArray[np.float32], label: NDArray[
     if len(path) < 3 or len(path) + thick < 2.5 * thick + 2.0:
         return None
     line = smooth(lines.places(path))
-    middle, out, wander = direction(line[: SUPPORT + 1])
-    tip = middle + out * float(np.dot(line[0] - middle, out))
+    tip, out, wander = direction(line[: SUPPORT + 1])
     reach = _to_edge(tip + 1.0, out, half)
     x, y = tip + out * reach
     steps = line[1:] - line[:-1]
@@ -163,7 +164,11 @@ def smooth(line: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def direction(line: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-    """Middle, unit direction towards the first point, and mean distance of a line ``(n, 2)`` from straight."""
+    """Foot on the wall's axis next to the tip, unit direction out of the wall there, mean distance from straight.
+
+    ``line`` ``(n, 2)`` begins at the tip.  A wall that bends evenly has left its mean direction by the time it ends:
+    where one bend explains the line clearly better than none, foot and direction are those of the bend.
+    """
     weight = _WEIGHTS[: len(line)]
     middle = weight @ line / weight.sum()
     off = line - middle
@@ -172,7 +177,19 @@ def direction(line: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[n
     out = np.array([math.cos(turn), math.sin(turn)])
     if np.dot(line[0] - line[-1], out) < 0:
         out = -out
-    return middle, out, float(np.abs(off[:, 1] * out[0] - off[:, 0] * out[1]).mean())
+    normal = np.array([-out[1], out[0]])
+    along, aside = off @ out, off @ normal
+    foot, wander = middle + out * along[0], float(np.abs(aside).mean())
+    if len(line) < _BENDABLE:
+        return foot, out, wander
+    basis = np.stack([np.ones_like(along), along, along**2], axis=1)
+    bend = np.linalg.solve((basis.T * weight) @ basis + 1e-9 * np.eye(3), (basis.T * weight) @ aside)
+    left = float(np.abs(basis @ bend - aside).mean())
+    if left > _CLEARLY * wander:
+        return foot, out, wander
+    slope = bend[1] + 2.0 * bend[2] * along[0]
+    foot = foot + normal * (basis[0] @ bend)
+    return foot, (out + normal * slope) / math.hypot(1.0, slope), left
 
 
 def _to_edge(tip: NDArray[np.float64], out: NDArray[np.float64], half: NDArray[np.float32]) -> float:
