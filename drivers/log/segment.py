@@ -155,6 +155,10 @@ class Segment:
         for message in buffer.messages:
             self._counts[message.channel_id] = self._counts.get(message.channel_id, 0) + 1
 
+    def fileno(self) -> int:
+        """File descriptor of the file."""
+        return self._file.fileno()
+
     def sync(self) -> None:
         """Wait until what was written is on the disk."""
         os.fdatasync(self._file.fileno())

@@ -13,6 +13,7 @@ from config.schema import Config
 from drivers.log.header import LogHeader
 from drivers.log.names import segment_path, segments
 from drivers.log.segment import PART, ChannelTable, ChunkBuffer, Segment
+from drivers.log.syncer import Syncer
 from drivers.records import Record
 
 FLUSH_NS: Final = 200_000_000
@@ -54,6 +55,7 @@ class LogWriter:
         self._unsynced_t_ns: int | None = None
         self._retry_t_ns: int | None = None
         self._closed = False
+        self._syncer = Syncer()
         self._next = 1
         self._previous: str | None = None
         self.lost_records = 0
@@ -112,7 +114,8 @@ class LogWriter:
     def tick(self, t_ns: int) -> None:
         """Flush and sync what has waited long enough at ``t_ns``, on the clock of the records' ``t_ns``.
 
-        Raises LogError where the disk refuses, and then leaves it in peace for a second.
+        It does not wait for the sync; a slow disk makes the next one later.  Raises LogError where the disk refuses,
+        and then leaves it in peace for a second.
         """
         if self._retry_t_ns is not None and t_ns < self._retry_t_ns:
             return
@@ -120,11 +123,24 @@ class LogWriter:
         try:
             if self._oldest_t_ns is not None and t_ns - self._oldest_t_ns >= FLUSH_NS:
                 self.flush()
-            if self._unsynced_t_ns is not None and t_ns - self._unsynced_t_ns >= SYNC_NS:
-                self.sync()
+            self._sync_meanwhile(t_ns)
         except LogError:
             self._retry_t_ns = t_ns + RETRY_NS
             raise
+
+    def _sync_meanwhile(self, t_ns: int) -> None:
+        if self._syncer.is_busy:
+            return
+        try:
+            self._syncer.check()
+        except OSError as error:
+            self._abandon()
+            raise self._refused(error) from error
+        if self._segment is None or self._unsynced_t_ns is None or t_ns - self._unsynced_t_ns < SYNC_NS:
+            return
+        self.flush()
+        self._unsynced_t_ns = None
+        self._syncer.start(self._segment.fileno())
 
     def close(self) -> None:
         """Write what is left and give the last segment its name; a second call does nothing.
@@ -138,6 +154,7 @@ class LogWriter:
             self.flush()
         finally:
             self._drop_buffer()
+            self._syncer.close()
         self._end()
 
     def __enter__(self) -> LogWriter:

@@ -5,29 +5,10 @@ from __future__ import annotations
 import os
 import signal
 import time
-from collections.abc import Iterator
-from pathlib import Path
-
-import pytest
 
 from drivers.log import read_log
 from drivers.records import Event
 from tests.daemon.rig import Rig, configuration
-
-
-@pytest.fixture
-def rig(tmp_path: Path) -> Iterator[Rig]:
-    made = Rig(tmp_path)
-    yield made
-    made.close()
-
-
-@pytest.fixture
-def line() -> Iterator[tuple[int, str]]:
-    ours, theirs = os.openpty()
-    yield ours, os.ttyname(theirs)
-    os.close(ours)
-    os.close(theirs)
 
 
 def is_of_another_session(rig: Rig, session: str) -> bool:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
@@ -14,13 +12,6 @@ from drivers.readings import Ping
 from drivers.records import Chunk, Event, Record
 from drivers.tritech.decoder import TritechDecoder
 from tests.daemon.rig import Rig, configuration
-
-
-@pytest.fixture
-def rig(tmp_path: Path) -> Iterator[Rig]:
-    made = Rig(tmp_path)
-    yield made
-    made.close()
 
 
 def newest(rig: Rig) -> dict[str, float]:

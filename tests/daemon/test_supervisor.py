@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -19,22 +18,6 @@ from drivers.log import read_header, read_log
 from drivers.records import Chunk, Event
 from tests.daemon.rig import PATIENCE_S, Rig, configuration, free_ports
 from tools.cli import main
-
-
-@pytest.fixture
-def rig(tmp_path: Path) -> Iterator[Rig]:
-    made = Rig(tmp_path)
-    yield made
-    made.close()
-
-
-@pytest.fixture
-def line() -> Iterator[tuple[int, str]]:
-    """A pseudo-terminal: our end, and the name of the other."""
-    ours, theirs = os.openpty()
-    yield ours, os.ttyname(theirs)
-    os.close(ours)
-    os.close(theirs)
 
 
 def replayed(logs: Path) -> dict[str, str]:

@@ -102,7 +102,7 @@ def measure(folder: Path, cycles: int) -> Iterator[Figure]:
         rig.start()
         lines = _lines(rig)
         calm, calm_talk = rig.wires[_CALM], sentences(99)
-        rig.listen(0.5)
+        rig.listen(1.5)
         descriptors, threads, heard = rig.descriptors(), rig.threads(), len(rig.events)
         while sum(line.cycles for line in lines) < cycles or any(line.is_out or line.returned_s for line in lines):
             now_s = time.monotonic()
