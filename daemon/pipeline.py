@@ -34,7 +34,7 @@ class Pipeline:
         self._decoders = decoders_for(config)
         self._scans = ScanBuilder(config.map)
         self._mapper = Mapper(config.map)
-        self._filler = Filler(config.fill, config.map.occupied_threshold)
+        self._filler = Filler(config.fill)
         self._extent = Extent(config.site.height_m)
         self._grids = GridStream()
         self._stamp: Stamp = (0, 0)

@@ -15,7 +15,7 @@ from fill.candidates import Candidate
 from fill.certainty import Logistic
 from fill.freedom import capped
 from fill.matching import assign, candidates, gain
-from fill.segments import Walls, find_walls
+from fill.segments import EIGHT, Walls, find_walls
 from mapping.values import OCCUPIED, UNKNOWN
 
 THRESHOLD: Final = 0.35
@@ -75,8 +75,7 @@ def _close_round(
     chances = model.chance(np.stack([each.features for each in found]))
     closed: list[Closed] = []
     for index in assign(found, [gain(float(chance), threshold) for chance in chances]):
-        cells = fill_cells(found[index], state, wall)
-        if len(cells):
+        for cells in fill_cells(found[index], state, wall):
             closed.append(Closed(found[index], cells, _away(cells, found[index]), float(chances[index])))
             wall[cells[:, 0], cells[:, 1]] = True
     return closed
@@ -95,8 +94,11 @@ def _away(cells: NDArray[np.int32], candidate: Candidate) -> NDArray[np.float64]
     return np.asarray(np.hypot(*(cells[None] - ends[:, None]).transpose(2, 0, 1)).min(axis=0), np.float64)
 
 
-def fill_cells(candidate: Candidate, state: NDArray[np.uint8], wall: NDArray[np.bool_]) -> NDArray[np.int32]:
-    """Unknown cells ``(n, 2)`` that the fill takes: its path, and about it the thickness of the walls it joins."""
+def fill_cells(candidate: Candidate, state: NDArray[np.uint8], wall: NDArray[np.bool_]) -> list[NDArray[np.int32]]:
+    """Unknown cells ``(n, 2)`` that the fill takes: its path, and about it the thickness of the walls it joins.
+
+    Where measured wall stands in between, each stretch of the fill comes by itself.
+    """
     path = candidate.path
     margin = int(max(candidate.half_a, candidate.half_b)) + 2
     low = np.maximum(path.min(axis=0) - margin, 0)
@@ -112,7 +114,6 @@ def fill_cells(candidate: Candidate, state: NDArray[np.uint8], wall: NDArray[np.
     share = place[nearest[0], nearest[1]]
     radius = candidate.half_a + share * (candidate.half_b - candidate.half_a) - 0.5
     taken = open_here & (away <= np.maximum(radius, 0.0) + 1e-9)
-    parts, _ = ndimage.label(taken)
-    kept = np.isin(parts, np.unique(parts[rows, cols])) & taken
-    cells: NDArray[np.int32] = (np.argwhere(kept) + low).astype(np.int32)
-    return cells
+    parts, _ = ndimage.label(taken, EIGHT)
+    on_path = np.unique(parts[rows, cols])
+    return [(np.argwhere(parts == part) + low).astype(np.int32) for part in on_path[on_path > 0]]

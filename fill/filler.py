@@ -1,4 +1,4 @@
-"""Filling the holes of an evidence grid: the loop, one line a step."""
+"""Filling the holes of an evidence grid: learn how far fills can be trusted here, close holes, lay them out."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from config.schema import Fill
 from fill.certainty import Belief, hole_certainty
 from fill.closing import Closed, close_holes, open_ends
 from fill.lessons import learn
+from fill.paper import paper_fill
 from fill.prior import prior
 from fill.values import Filled, Hole
 from mapping.values import Grid
@@ -17,18 +18,24 @@ from mapping.values import Grid
 class Filler:
     """Fills holes; each call starts from the evidence alone, so that a fill new evidence denies is gone at once."""
 
-    def __init__(self, config: Fill, occupied_threshold: float) -> None:
+    def __init__(self, config: Fill) -> None:
         self._config = config
-        self._threshold = occupied_threshold
 
     def update(self, grid: Grid) -> Filled:
         """Fill the holes of ``grid``: the same grid and configuration give the same fills."""
         longest = self._config.max_gap_m / grid.cell_m
         random = np.random.default_rng(self._config.seed)
-        belief = learn(grid.state, longest, prior(), random)
-        closed = close_holes(grid.state, longest, belief.hole)
-        holes = tuple(_hole(index, each, belief, grid) for index, each in enumerate(closed))
-        return filled_grid(grid, holes, places_m(open_ends(grid.state, closed), grid))
+        holes, left = (_chord_fill if self._config.method == "chord" else paper_fill)(grid, longest, random)
+        return filled_grid(grid, holes, places_m(left, grid))
+
+
+def _chord_fill(
+    grid: Grid, longest: float, random: np.random.Generator
+) -> tuple[tuple[Hole, ...], NDArray[np.float64]]:
+    belief = learn(grid.state, longest, prior(), random)
+    closed = close_holes(grid.state, longest, belief.hole)
+    holes = tuple(_hole(index, each, belief, grid) for index, each in enumerate(closed))
+    return holes, open_ends(grid.state, closed)
 
 
 def filled_grid(grid: Grid, holes: tuple[Hole, ...], open_ends_m: NDArray[np.float64]) -> Filled:
@@ -43,7 +50,7 @@ def filled_grid(grid: Grid, holes: tuple[Hole, ...], open_ends_m: NDArray[np.flo
 
 
 def places_m(cells: NDArray[np.float64], grid: Grid) -> NDArray[np.float64]:
-    """Places ``(n, 2)`` of x and y in the map, m, of places in cells."""
+    """Return places ``(n, 2)`` of x and y in the map, m, for places in cells."""
     return (cells + 0.5) * grid.cell_m + (grid.x0_m, grid.y0_m)
 
 

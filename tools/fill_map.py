@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
 
 def fill_map(read: RosMap, config: Config) -> MapState:
     """Fill the holes of a map and extrude it; there are no stations."""
-    filled = Filler(config.fill, config.map.occupied_threshold).update(read.grid)
+    filled = Filler(config.fill).update(read.grid)
     mesh = extrude(filled, 0.0, config.site.height_m or _HEIGHT_M)
     return MapState((), read.grid, filled, mesh)
 

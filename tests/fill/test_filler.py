@@ -38,7 +38,7 @@ def room() -> State:
 @pytest.fixture
 def fill() -> Fills:
     """Fill a layer of states with the default configuration."""
-    return lambda state: Filler(Fill(), 0.75).update(grid_of(state))
+    return lambda state: Filler(Fill()).update(grid_of(state))
 
 
 def forget(state: State, rows: slice, cols: slice) -> State:
@@ -149,13 +149,13 @@ def test_turned_and_mirrored_the_same_hole_is_closed(room: State, fill: Fills, t
 
 def test_the_same_grid_gives_the_same_fills(room: State) -> None:
     cut = forget(forget(room, slice(12, 16), slice(50, 60)), slice(40, 52), slice(10, 20))
-    one, two = (Filler(Fill(), 0.75).update(grid_of(cut)) for _ in range(2))
+    one, two = (Filler(Fill()).update(grid_of(cut)) for _ in range(2))
     assert np.array_equal(one.hole, two.hole)
     assert one.certainty.tobytes() == two.certainty.tobytes()
 
 
 def test_new_evidence_withdraws_a_fill(room: State) -> None:
-    filler = Filler(Fill(), 0.75)
+    filler = Filler(Fill())
     cut = forget(room, slice(12, 16), slice(50, 62))
     assert filler.update(grid_of(cut)).holes
     cut[8:16, 50:62] = FREE
