@@ -29,8 +29,8 @@ def sonar(rig: Rig) -> dict[str, object]:
 
 
 def test_the_sonar_is_set_while_it_scans(rig: Rig) -> None:
-    rig.emulate(speed=8.0, stations=1)
-    rig.run(configuration(rig.folder, rig.folder / "ports" / "sonar", rig.ports), rate=8.0)
+    rig.emulate(speed=4.0, stations=1)
+    rig.run(configuration(rig.folder, rig.folder / "ports" / "sonar", rig.ports), rate=4.0)
     rig.wait(lambda: rig.count("ping") > 20)
     assert rig.ask(id=1, do="sonar", range_m=5.0)["ok"] is True
     rig.wait(lambda: newest(rig)["range_m"] == pytest.approx(5.0, rel=0.05))

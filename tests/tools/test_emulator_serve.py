@@ -24,7 +24,7 @@ from drivers.tritech.head import Head
 from tools.emulator.ptys import FolderLock, PtyPort
 from tools.emulator.serve import Emulation, spawn
 
-SPEED = 20.0
+SPEED = 8.0
 
 
 class Host:
