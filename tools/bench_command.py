@@ -11,11 +11,12 @@ from pathlib import Path
 from typing import Final
 
 from config.errors import UsageError
-from tools.bench import acquisition, tank, truth
+from tools.bench import acquisition, holes, holes_table, tank, truth
 
 Row = dict[str, str | int | float]
 
-_BENCHES: Final = ("tank", "truth", "acquisition")
+_BENCHES: Final = ("tank", "truth", "acquisition", "holes")
+_ON_DATA: Final = ("tank", "holes")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,6 +25,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--data", type=Path, default=Path("../shared/data"), metavar="DIR", help="real recordings")
     parser.add_argument("--seeds", type=int, default=2, metavar="N", help="emulated dives per site (default: 2)")
     parser.add_argument("--quick", action="store_true", help="acquisition: a short run, for a first look")
+    parser.add_argument("--half", choices=("tune", "report"), default="report", help="holes: maps to measure on")
+    parser.add_argument("--maps", type=int, default=4, metavar="K", help="holes: damaged pieces per map (default: 4)")
+    parser.add_argument("--seed", type=int, default=1, metavar="N", help="holes: what is lost (default: 1)")
+    parser.add_argument("--pictures", type=Path, metavar="DIR", help="holes: draw what was filled right and wrong")
     parser.add_argument("--json", action="store_true", help="print JSON lines")
 
 
@@ -33,8 +38,8 @@ def run(args: argparse.Namespace) -> int:
     if wrong := set(args.benches) - set(_BENCHES):
         raise UsageError(f"there is no bench {', '.join(sorted(wrong))}; choose of {', '.join(_BENCHES)}")
     for name in args.benches or _BENCHES:
-        if name == "tank" and not args.benches and not args.data.is_dir():
-            print(f"tank: left out, no recordings in {args.data} (name their folder with --data)")
+        if name in _ON_DATA and not args.benches and not args.data.is_dir():
+            print(f"{name}: left out, no recordings in {args.data} (name their folder with --data)")
             continue
         for row in _measure(name, args):
             print(json.dumps({"bench": name} | row) if args.json else _line(name, row), flush=True)
@@ -49,6 +54,7 @@ def _measure(name: str, args: argparse.Namespace) -> Iterator[Row]:
         "tank": _tank,
         "truth": _truth,
         "acquisition": _acquisition,
+        "holes": _holes,
     }
     return measures[name](args)
 
@@ -68,5 +74,13 @@ def _acquisition(args: argparse.Namespace) -> Iterator[Row]:
         yield figure.row()
 
 
+def _holes(args: argparse.Namespace) -> Iterator[Row]:
+    if args.maps < 1 or args.seed < 0:
+        raise UsageError("--maps must be at least 1 and --seed at least 0")
+    yield from holes.measure(holes.HoleOptions(args.data, args.half, args.seed, args.maps, args.pictures))
+
+
 def _line(name: str, row: Row) -> str:
+    if name == "holes":
+        return holes_table.line(row)
     return f"{name}: " + ", ".join(f"{key} {value}" for key, value in row.items())
