@@ -33,7 +33,7 @@ from drivers.records import Json
 from drivers.tritech.head import Head
 
 _LOOK_S: Final = 0.02
-_ROUND_S: Final = 0.01
+_ROUND_S: Final = 0.02
 """Pause of each round: reading every few bytes as they come would cost several times the processor.
 
 It is a fraction of a ping, and the kernel holds a third of a second of a line.
