@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Final
 
 from config.errors import UsageError
-from tools.bench import acquisition, holes, holes_table, tank, truth
+from tools.bench import acquisition, holes, holes_maps, holes_paper, holes_table, tank, truth
 
 Row = dict[str, str | int | float]
 
@@ -29,6 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--maps", type=int, default=4, metavar="K", help="holes: damaged pieces per map (default: 4)")
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="holes: what is lost (default: 1)")
     parser.add_argument("--pictures", type=Path, metavar="DIR", help="holes: draw what was filled right and wrong")
+    parser.add_argument("--paper-measure", action="store_true", help="holes: also the measure of the paper's table 1")
     parser.add_argument("--json", action="store_true", help="print JSON lines")
 
 
@@ -78,6 +79,8 @@ def _holes(args: argparse.Namespace) -> Iterator[Row]:
     if args.maps < 1 or args.seed < 0:
         raise UsageError("--maps must be at least 1 and --seed at least 0")
     yield from holes.measure(holes.HoleOptions(args.data, args.half, args.seed, args.maps, args.pictures))
+    if args.paper_measure:
+        yield from holes_paper.measure_as_paper(holes_maps.sources(args.data, args.half), args.seed)
 
 
 def _line(name: str, row: Row) -> str:

@@ -61,8 +61,8 @@ def _face(a: End, b: End, gap: float) -> bool:
 
 def _gate(a: End, b: End, gap: float, truth: NDArray[np.uint8]) -> Gate | None:
     share = np.linspace(0.15, 0.85, int(2 * gap))
-    row = np.rint(a.y + share * (b.y - a.y)).astype(np.int64)
-    col = np.rint(a.x + share * (b.x - a.x)).astype(np.int64)
+    row = np.clip(np.rint(a.y + share * (b.y - a.y)), 0, truth.shape[0] - 1).astype(np.int64)
+    col = np.clip(np.rint(a.x + share * (b.x - a.x)), 0, truth.shape[1] - 1).astype(np.int64)
     if np.mean(truth[row, col] == FREE) < _FREE:
         return None
     middle = (a.y + b.y) / 2, (a.x + b.x) / 2
