@@ -12,19 +12,34 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import erf
 
 from mapping.values import Returns, Scan
 
-OCCUPIED_LOG_ODDS = 2.4
+OCCUPIED_LOG_ODDS = 3.0
 """Of a wall whose range is known to about a cell; less where the range is less sure."""
 FREE_LOG_ODDS = -0.9
+THICK = 0.4
+"""A wall is at least this thick, in cells, behind its face."""
+HINT_LOG_ODDS = 0.5
+"""Occupied by no more than this is a hint: hints of several scans are not added up, for they err alike."""
+VAGUE_LOG_ODDS = 0.45
+"""A vague return's hint, within its standard deviation."""
+BACK_M = 0.1
+"""Behind its face a wall goes on at least so far, hardly seen: a hint."""
+PLACE_SD_M = 0.005
+"""What a station's place and its compass add to the range's standard deviation."""
+VAGUE_SD_M = 0.12
+"""Returns of more than this draw no wall ..."""
+BLIND_SD_M = 0.3
+"""... and of more than this give no hint."""
 FINE_RAD = math.radians(0.3)
 """Bearing step of the table: 5 cm at 10 m."""
 JOIN_M = 0.12
 """Neighbouring returns are one wall where their ranges differ by no more than this ..."""
 JOIN_SLOPE = 2.5
 """... or by this times the arc between them (68 degrees of incidence)."""
-SPREAD = 0.15
+SPREAD = 0.08
 """Share of the arc within the beam by which an oblique wall's range is unsure."""
 
 
@@ -68,7 +83,8 @@ def spread(bearing_rad: NDArray[np.float64], returns: Returns, step_rad: float, 
     range_m = np.where(joined, 1.0 / ((1.0 - share) / z[left] + share / z[right]), z[nearest])
     slope = np.where(joined, np.abs(z[right] - z[left]) / np.maximum(gap, 1e-9), 0.0)
     fan_sd = np.hypot(np.where(joined, np.fmax(sd[left], sd[right]), sd[nearest]), SPREAD * beam_rad * slope)
-    fan_free = np.where(joined, range_m, np.minimum(free[nearest], np.maximum(free[left], free[right])))
+    open_to_it = joined & (free[left] >= z[left]) & (free[right] >= z[right])
+    fan_free = np.where(open_to_it, range_m, np.where(joined, np.minimum(free[left], free[right]), free[nearest]))
     return Fan(
         np.where(covered, range_m, np.nan),
         np.where(covered, fan_sd, np.nan),
@@ -77,16 +93,41 @@ def spread(bearing_rad: NDArray[np.float64], returns: Returns, step_rad: float, 
 
 
 def polar_evidence(scan: Scan, returns: Returns, beam_rad: float, cell_m: float) -> PolarEvidence:
-    """Compute what a scan says about each bearing and range, relative to its own heading."""
+    """Compute what a scan says about each bearing and range, relative to its own heading.
+
+    The wall's face lies at the return's range with its standard deviation.  A cell is occupied where the face is in it
+    or just before it, free where the face is behind it, and unknown where the face is before it by more than that.
+    """
     step_m = cell_m / 2.5
     fan = spread(scan.bearing_rad, returns, scan.step_rad, beam_rad)
-    heard_m = float(np.nanmax(np.concatenate([fan.range_m, fan.free_m, [cell_m]])))
-    ranges = (np.arange(math.ceil((heard_m + 6.0 * cell_m) / step_m)) + 0.5) * step_m
-    sd = np.hypot(fan.sd_m, 0.4 * cell_m)[:, None]
-    away = (ranges[None, :] - fan.range_m[:, None]) / sd
-    peak = OCCUPIED_LOG_ODDS * np.minimum(1.0, cell_m / sd)
-    occupied = np.where(np.abs(away) < 3.5, peak * np.exp(-0.5 * away**2), 0.0)
-    clear_m = np.where(np.isfinite(fan.range_m), np.fmin(fan.free_m, fan.range_m - 2.0 * sd[:, 0]), fan.free_m)
-    free = np.where(ranges[None, :] < clear_m[:, None], FREE_LOG_ODDS, 0.0)
-    log_odds = np.where(np.isnan(fan.range_m)[:, None], free, np.where(free < 0.0, free, occupied))
-    return PolarEvidence(log_odds.astype(np.float32), step_m)
+    drawn = np.isfinite(fan.range_m) & (fan.sd_m < VAGUE_SD_M)
+    hinted = np.isfinite(fan.range_m) & ~drawn & (fan.sd_m < BLIND_SD_M)
+    heard_m = float(np.max(np.concatenate([fan.range_m[drawn | hinted], fan.free_m, [cell_m]])))
+    ranges = (np.arange(math.ceil((heard_m + 8.0 * cell_m) / step_m)) + 0.5) * step_m
+    sd = np.hypot(np.nan_to_num(fan.sd_m), PLACE_SD_M)
+    clear_m = np.where(drawn, fan.range_m - 4.0 * sd - cell_m, np.fmin(fan.free_m, fan.range_m - 2.0 * sd))
+    log_odds = np.where(ranges < clear_m[:, None], FREE_LOG_ODDS, 0.0).astype(np.float32)
+    vague = hinted[:, None] & (np.abs(ranges - fan.range_m[:, None]) < fan.sd_m[:, None]) & (log_odds == 0.0)
+    log_odds[vague] = VAGUE_LOG_ODDS
+    for fine in np.flatnonzero(drawn):
+        first, last = np.searchsorted(
+            ranges, (clear_m[fine], fan.range_m[fine] + 4.0 * sd[fine] + 2.0 * cell_m + BACK_M)
+        )
+        log_odds[fine, first:last] = of_face(ranges[first:last] - fan.range_m[fine], sd[fine], cell_m)
+    return PolarEvidence(log_odds, step_m)
+
+
+def of_face(behind_m: NDArray[np.float64], sd_m: float, cell_m: float) -> NDArray[np.float64]:
+    """Log-odds of cells whose centres lie ``behind_m`` behind a wall's face as it was measured."""
+    half, thick = 0.5 * cell_m, THICK * cell_m
+    before = 0.5 * (1.0 - erf((behind_m + half) / (sd_m * math.sqrt(2.0))))
+    past = 0.5 * (1.0 + erf((behind_m - half - thick) / (sd_m * math.sqrt(2.0))))
+    within = 1.0 - before - past
+    p = within * _odds(OCCUPIED_LOG_ODDS) + before * _odds(FREE_LOG_ODDS) + past * 0.5
+    log_odds = np.log(p / (1.0 - p))
+    behind = (behind_m > 0.0) & (behind_m < BACK_M + 2.0 * sd_m)
+    return np.asarray(np.where(behind, np.maximum(log_odds, VAGUE_LOG_ODDS), log_odds), dtype=np.float64)
+
+
+def _odds(log_odds: float) -> float:
+    return 1.0 / (1.0 + math.exp(-log_odds))

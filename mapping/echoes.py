@@ -1,62 +1,80 @@
 """From echoes to returns: where each beam sees the wall, or that it does not say.
 
-The transducer's ringing and rings of constant range are taken out, a line is drawn through all beams
-(``mapping.contour``), and each beam moves from the line to its first strong peak nearby.  A beam abstains rather than
-guess: where its echo is faint, and where the line is broken.  Where the echo has no clear place along the range, as in
-corners, or the line is rough or short, the return is vague: it has a large standard deviation.
+What is no wall is taken out (``mapping.clutter``), a line is drawn through all beams (``mapping.contour``), and each
+beam moves from the line to its first strong peak nearby (``mapping.peaks``).  Neighbouring beams then say together
+where their wall is (``mapping.lines``).  A beam abstains rather than guess: where its echo is faint, and where the
+line is broken.  Where the echo has no clear place along the range, as in corners, or the line is rough or short, the
+return is vague: it has a large standard deviation.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d
 
 from config.schema import Map
+from mapping.between import NEIGHBOUR_RAD, Seen, expected_m, faint_behind, peak_near, sides, veils
+from mapping.clutter import SMOOTH_M, deaf_m, floor_of, lobe_weights, rings_of, smoothed, without_ringing
 from mapping.contour import LOUD, trace
+from mapping.lines import Fit, fit_walls
+from mapping.mirror import Heard, images
+from mapping.peaks import centre_m, longer_m, snap, width_of
 from mapping.values import Returns, Scan
 
-COUNTS_6_DB = 6.0 * 255.0 / 80.0
-RINGING_M = 0.8
-"""The transducer rings to here at most; what all bearings show alike within it is no echo."""
-RINGING_EXCESS = 18.0
-"""Counts by which an echo must exceed what all bearings show within the zone of ringing."""
-RINGING_LEVEL = 40.0
-SMOOTH_M = 0.04
-RING_WIDTH_M = 0.4
-"""What all bearings show at one range, narrower than this, is a side-lobe ring, a surface or a floor ..."""
-RING_FAINT = 20.0
-"""... if it is fainter than the walls by these counts; in a round room the wall itself is such a ring."""
-SNAP_BACK_M, SNAP_ON_M = 0.06, 0.15
-"""The peak is looked for this far before and behind the line, which clings to leading edges."""
-STRONG = 12.0
-"""Counts below the highest nearby at which the first peak is taken."""
-FAINT = 20.0
+FAINT: Final = 20.0
 """Counts above the floor, median of five beams along the line, below which a beam abstains."""
-ROUGH_M = 0.12
+ROUGH_M: Final = 0.12
 """Second difference of the range from beam to beam beyond which a beam abstains."""
-WIDE_M = 0.35
+WIDE_M: Final = 0.35
 """A beam with more than this at the level of its peak, less 6 dB, has no clear place: a corner, or noise."""
-SHORT_M = 0.3
+SHORT_M: Final = 0.3
 """A wall of which less than this is seen without a break is no wall."""
-NEIGHBOUR_RAD = math.radians(30.0)
-"""A silent beam is vouched for by the walls seen within this on either side."""
-BASE_SD_M = 0.02
-VAGUE_SD_M = 0.15
+PEAK_SD_M: Final = 0.012
+"""Standard deviation of a wall met squarely ..."""
+SLANT_SD: Final = 0.6
+"""... and part of half its echo's length where it is met at a slant, which speckle moves it by."""
+OFF_SD: Final = 3.0
+"""A beam farther than this from the wall that its neighbours see is not of it."""
+VAGUE_SD_M: Final = 0.15
 """Least standard deviation of a vague return: it helps to place a scan, and draws no wall."""
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
-class _Peaks:
-    """Per beam in order of bearing, ``(n,)`` each: bins and ranges of the peaks, which are sure and which heard."""
+class Beams:
+    """A scan's beams in order of bearing: ``echoes`` without ringing, and ``excess`` above all that is no wall."""
+
+    bearing_rad: Floats
+    echoes: Floats
+    excess: Floats
+    floor: Floats
+    bin_m: float
+    step_rad: float
+    closed: bool
+    half_beam_rad: float
+    half_height_rad: float
+    deaf_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Peaks:
+    """Per beam in order of bearing, ``(n,)`` each: bins, ranges, sds of the peaks, which are sure and which heard.
+
+    ``expected_m`` is where the walls beside a beam would meet it, nan where there are none.
+    """
 
     bins: NDArray[np.intp]
-    range_m: NDArray[np.float64]
-    sure: NDArray[np.bool_]
-    heard: NDArray[np.bool_]
+    range_m: Floats
+    sd_m: Floats
+    sure: Flags
+    heard: Flags
+    expected_m: Floats
 
 
 def pick(scan: Scan, config: Map) -> Returns:
@@ -65,17 +83,16 @@ def pick(scan: Scan, config: Map) -> Returns:
     if n < 5 or bins < 16:
         return Returns(np.full(n, np.nan), np.full(n, np.nan), np.zeros(n))
     order, closed = in_order(scan)
-    echoes = without_ringing(scan.echoes[order], scan.bin_m, config.min_range_m)
-    excess = above_floor(gaussian_filter1d(echoes, SMOOTH_M / scan.bin_m, axis=1, mode="nearest"), scan.bin_m)
-    peaks = peaks_along(excess, scan, closed=closed)
-    width_m = width_of(excess, peaks.bins) * scan.bin_m
-    sd_m = np.where(peaks.sure, np.hypot(BASE_SD_M, width_m / 4.0), np.maximum(VAGUE_SD_M, width_m / 2.0))
-    free_m = np.where(peaks.sure, peaks.range_m, quiet_water(excess, peaks, scan, closed=closed))
+    beams = beams_of(scan, order, config, closed=closed)
+    peaks = peaks_along(beams)
+    free_m = np.where(peaks.sure, peaks.range_m, quiet_water(beams, peaks))
     back = np.empty(n, dtype=np.intp)
     back[order] = np.arange(n)
     offset = config.range_offset_m
     range_m = np.where(peaks.heard, np.maximum(peaks.range_m + offset, 0.0), np.nan)
-    return Returns(range_m[back], np.where(peaks.heard, sd_m, np.nan)[back], np.maximum(free_m + offset, 0.0)[back])
+    return Returns(
+        range_m[back], np.where(peaks.heard, peaks.sd_m, np.nan)[back], np.maximum(free_m + offset, 0.0)[back]
+    )
 
 
 def in_order(scan: Scan) -> tuple[NDArray[np.intp], bool]:
@@ -89,49 +106,85 @@ def in_order(scan: Scan) -> tuple[NDArray[np.intp], bool]:
     return np.roll(order, -(widest + 1)), False
 
 
-def without_ringing(echoes: NDArray[np.uint8], bin_m: float, min_range_m: float) -> NDArray[np.float64]:
-    """Echoes ``(n, bins)`` with what all bearings show near the head taken out."""
-    clear = echoes.astype(np.float64)
-    zone = min(echoes.shape[1], math.ceil(RINGING_M / bin_m))
-    near = clear[:, :zone]
-    common = np.median(near, axis=0)
-    echo = np.where(common > RINGING_LEVEL, near - common, near)
-    clear[:, :zone] = np.where(near > common + RINGING_EXCESS, echo, 0.0)
-    clear[:, : math.ceil(min_range_m / bin_m)] = 0.0
-    return clear
+def beams_of(scan: Scan, order: NDArray[np.intp], config: Map, *, closed: bool) -> Beams:
+    """Take out of a scan's echoes what is no wall."""
+    raw = scan.echoes[order].astype(np.float64)
+    echoes = without_ringing(raw, scan.bin_m, config.min_range_m)
+    smooth = smoothed(echoes, scan.bin_m)
+    floor = floor_of(smooth, scan.bin_m)
+    excess = smooth - floor - rings_of(smooth, scan.bin_m)
+    excess = np.where(excess > 0.0, excess * lobe_weights(smooth, scan.step_rad, closed=closed), excess)
+    bearing = scan.bearing_rad[order]
+    width, height = math.radians(config.beam_deg) / 2.0, math.radians(config.beam_vertical_deg) / 2.0
+    return Beams(
+        bearing, echoes, excess, floor, scan.bin_m, scan.step_rad, closed, width, height, deaf_m(raw, scan.bin_m)
+    )
 
 
-def above_floor(smooth: NDArray[np.float64], bin_m: float) -> NDArray[np.float64]:
-    """Echoes above the noise of their range and above faint rings of constant range, in counts."""
-    common = np.median(smooth, axis=0)
-    ring = np.maximum(common - gaussian_filter1d(common, RING_WIDTH_M / bin_m), 0.0)
-    walls = float(np.median(smooth.max(axis=1)))
-    ring[common > walls - RING_FAINT] = 0.0
-    floor = gaussian_filter1d(np.percentile(smooth, 30.0, axis=0), 0.1 / bin_m)
-    return np.asarray(smooth - floor - ring, dtype=np.float64)
-
-
-def peaks_along(excess: NDArray[np.float64], scan: Scan, *, closed: bool) -> _Peaks:
+def peaks_along(beams: Beams) -> Peaks:
     """Follow the contour, move to the first strong peak next to it, and judge each beam."""
-    line = trace(excess, scan.bin_m, scan.step_rad, closed=closed)
-    at = snap(excess, line.bins, scan.bin_m)
-    rows = np.arange(len(at))
-    level = excess[rows, at]
-    range_m = (at + 0.5 + _between(excess, at)) * scan.bin_m
+    excess, bin_m, step, closed = beams.excess, beams.bin_m, beams.step_rad, beams.closed
+    line = trace(excess, bin_m, step, closed=closed)
+    if closed:
+        weights = veils(excess, line.bins, bin_m, step)
+        if weights.min() < 1.0:
+            beams = replace(beams, excess=excess * weights)
+            line = trace(beams.excess, bin_m, step, closed=closed)
+    at = snap(beams.excess, line.bins, bin_m)
+    centre = centre_m(beams.echoes, beams.floor, at, bin_m)
+    range_m = centre - longer_m(centre, beams.half_height_rad)
+    heard, sure = judge(beams, at, range_m, line.joined)
+    fit, sd_m = walls_of(beams, range_m, heard)
+    return settle(beams, Peaks(at, range_m, sd_m, sure, heard, range_m), fit)
+
+
+def judge(beams: Beams, at: NDArray[np.intp], range_m: Floats, joined: Flags) -> tuple[Flags, Flags]:
+    """Tell which beams are heard, and which of them have a clear place on a line that goes on."""
+    level = beams.excess[np.arange(len(at)), at]
     around = np.median([np.roll(level, k) for k in (-2, -1, 0, 1, 2)], axis=0)
     bend = np.abs(np.roll(range_m, 1) - 2.0 * range_m + np.roll(range_m, -1))
-    if not closed:
+    if not beams.closed:
         bend[[0, -1]] = 0.0
-    wide = (excess >= (level - COUNTS_6_DB)[:, None]).sum(axis=1) * scan.bin_m > WIDE_M
-    heard = line.joined & (around > FAINT) & (bend < 2.0 * ROUGH_M)
+    wide = width_of(beams.excess, at) * beams.bin_m > WIDE_M
+    heard = joined & (around > FAINT) & (bend < 2.0 * ROUGH_M)
     sure = heard & (bend < ROUGH_M) & ~wide
-    sure &= long_enough(sure, range_m, scan.step_rad, closed=closed)
-    return _Peaks(at, range_m, sure, heard & long_enough(heard, range_m, scan.step_rad, closed=closed))
+    sure &= long_enough(sure, range_m, beams.step_rad, closed=beams.closed)
+    return heard & long_enough(heard, range_m, beams.step_rad, closed=beams.closed), sure
 
 
-def long_enough(
-    sure: NDArray[np.bool_], range_m: NDArray[np.float64], step_rad: float, *, closed: bool
-) -> NDArray[np.bool_]:
+def walls_of(beams: Beams, range_m: Floats, heard: Flags) -> tuple[Fit, Floats]:
+    """Fit walls to the beams that are heard; give each beam's own standard deviation, which grows with the slant."""
+    seen = np.where(heard, range_m, np.nan)
+    sd_m = np.full(len(seen), 2.0 * PEAK_SD_M)
+    for _ in range(2):
+        fit = fit_walls(beams.bearing_rad, seen, sd_m, beams.step_rad, closed=beams.closed)
+        slope = np.where(np.isfinite(fit.slope), np.abs(fit.slope), 1.0)
+        sd_m = np.hypot(PEAK_SD_M, SLANT_SD * slope * beams.half_beam_rad)
+    return fit, sd_m
+
+
+def settle(beams: Beams, peaks: Peaks, fit: Fit) -> Peaks:
+    """Put sure beams onto their walls; let beams beside them look where those walls would be."""
+    of_wall = peaks.sure & (np.abs(fit.range_m - peaks.range_m) < OFF_SD * peaks.sd_m + beams.bin_m)
+    of_wall &= ~images(
+        beams.bearing_rad, fit.range_m, fit.wall, of_wall, Heard(beams.excess, beams.bin_m, beams.deaf_m)
+    )
+    level = beams.excess[np.arange(len(peaks.bins)), peaks.bins]
+    seen = Seen(beams.bearing_rad, peaks.range_m, level)
+    of_wall &= ~faint_behind(seen, of_wall, fit.wall, beams.step_rad, closed=beams.closed)
+    range_m = np.where(of_wall, fit.range_m, peaks.range_m)
+    sd_m = np.where(of_wall, fit.sd_m, np.maximum(peaks.sd_m, VAGUE_SD_M))
+    expected = expected_m(beams.bearing_rad, fit.wall, of_wall, beams.step_rad, closed=beams.closed)
+    return replace(peaks, range_m=range_m, sd_m=sd_m, sure=of_wall, expected_m=expected)
+
+
+def answers_m(beams: Beams, peaks: Peaks) -> Floats:
+    """Range ``(n,)`` that each beam would tell if it had to: beside the walls, the peak nearest to where they lead."""
+    at = peak_near(beams.excess, np.where(peaks.sure, np.nan, peaks.expected_m), beams.bin_m)
+    return np.where(at >= 0, (at + 0.5) * beams.bin_m, peaks.range_m)
+
+
+def long_enough(sure: Flags, range_m: Floats, step_rad: float, *, closed: bool) -> Flags:
     """Whether a beam is in a run of sure beams along which a wall of ``SHORT_M`` is seen, ``(n,)``."""
     n = len(sure)
     if sure.all():
@@ -144,53 +197,16 @@ def long_enough(
     return np.roll(turned & (total[run] >= SHORT_M), start)
 
 
-def snap(excess: NDArray[np.float64], line: NDArray[np.intp], bin_m: float) -> NDArray[np.intp]:
-    """Bin of the first strong local peak next to a line, ``(n,)``; the line's own where there is none."""
-    bins = excess.shape[1]
-    offsets = np.arange(-round(SNAP_BACK_M / bin_m), max(1, round(SNAP_ON_M / bin_m)) + 1)
-    at = np.clip(line[:, None] + offsets, 1, bins - 2)
-    here = np.take_along_axis(excess, at, axis=1)
-    left = np.take_along_axis(excess, at - 1, axis=1)
-    right = np.take_along_axis(excess, at + 1, axis=1)
-    peak = (here >= left) & (here >= right) & (here > here.max(axis=1, keepdims=True) - STRONG)
-    first = at[np.arange(len(line)), peak.argmax(axis=1)]
-    return np.where(peak.any(axis=1), first, line)
-
-
-def _between(excess: NDArray[np.float64], at: NDArray[np.intp]) -> NDArray[np.float64]:
-    """Place of a peak between bins, by a parabola, -0.5 to 0.5."""
-    rows, mid = np.arange(len(at)), np.clip(at, 1, excess.shape[1] - 2)
-    left, top, right = excess[rows, mid - 1], excess[rows, mid], excess[rows, mid + 1]
-    bend = np.minimum(left - 2.0 * top + right, -1e-9)
-    return np.asarray(np.clip(0.5 * (left - right) / bend, -0.5, 0.5), dtype=np.float64)
-
-
-def width_of(excess: NDArray[np.float64], at: NDArray[np.intp]) -> NDArray[np.float64]:
-    """Width of the peaks at -6 dB, ``(n,)`` bins."""
-    bins = np.arange(excess.shape[1])
-    low = excess < (excess[np.arange(len(at)), at] - COUNTS_6_DB)[:, None]
-    last = np.where(low & (bins > at[:, None]), bins, len(bins)).min(axis=1)
-    first = np.where(low & (bins < at[:, None]), bins, -1).max(axis=1)
-    return np.asarray(last - first - 1, dtype=np.float64)
-
-
-def quiet_water(excess: NDArray[np.float64], peaks: _Peaks, scan: Scan, *, closed: bool) -> NDArray[np.float64]:
+def quiet_water(beams: Beams, peaks: Peaks) -> Floats:
     """How far the water is open where a beam abstains: nothing was heard, and the walls on either side are farther.
 
-    Silence alone does not prove open water: a smooth wall seen at a slant throws the sound away.
+    Silence alone does not prove open water: a smooth wall seen at a slant throws the sound away, and what is heard
+    late may have come by way of it.  So nothing is said behind the lines of the walls on either side.
     """
-    heard = excess > LOUD
-    first = np.where(heard.any(axis=1), heard.argmax(axis=1), excess.shape[1]) * scan.bin_m
-    wall = np.where(peaks.sure, peaks.range_m, np.nan)
-    reach = max(1, int(NEIGHBOUR_RAD / scan.step_rad))
-    sides = [_next_wall(wall[::way], reach, closed=closed)[::way] for way in (1, -1)]
-    return np.asarray(np.minimum(first, np.minimum(*sides)) - 3.0 * SMOOTH_M, dtype=np.float64)
-
-
-def _next_wall(wall: NDArray[np.float64], reach: int, *, closed: bool) -> NDArray[np.float64]:
-    """Range of the last wall before each beam, ``(n,)``; 0 where there is none within ``reach`` beams."""
-    n = len(wall)
-    twice = np.concatenate([wall if closed else np.full(n, np.nan), wall])
-    place = np.maximum.accumulate(np.where(np.isfinite(twice), np.arange(2 * n), -1))[n:]
-    near = (place >= 0) & (np.arange(n, 2 * n) - place <= reach)
-    return np.where(near, twice[np.maximum(place, 0)], 0.0)
+    heard = beams.excess > LOUD
+    first = np.where(heard.any(axis=1), heard.argmax(axis=1), beams.excess.shape[1]) * beams.bin_m
+    reach = max(1, int(NEIGHBOUR_RAD / beams.step_rad))
+    walls = [np.where(side >= 0, peaks.range_m[side], 0.0) for side in sides(peaks.sure, reach, closed=beams.closed)]
+    return np.asarray(
+        np.fmin(np.minimum(first, np.minimum(*walls)), peaks.expected_m) - 3.0 * SMOOTH_M, dtype=np.float64
+    )

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.schema import Map
-from mapping.beam import PolarEvidence
+from mapping.beam import HINT_LOG_ODDS, PolarEvidence
 from mapping.values import FREE, OCCUPIED, UNKNOWN, Grid, Pose
 
 CLAMP_OCCUPIED = 4.6
@@ -36,13 +36,20 @@ def render(placed: Sequence[Placed], config: Map) -> Grid:
     south = math.floor(min(p.y_m - r for (p, _), r in zip(placed, reach, strict=True)) / cell)
     north = math.ceil(max(p.y_m + r for (p, _), r in zip(placed, reach, strict=True)) / cell)
     total = np.zeros((north - south, east - west), dtype=np.float64)
+    hints = np.zeros_like(total)
     for pose, evidence in placed:
-        add(total, pose, evidence, cell, (south, west))
+        add(total, hints, pose, evidence, cell, (south, west))
+    total = np.where(total >= 0.0, np.maximum(total, hints), total)
     return trim(np.clip(total, CLAMP_FREE, CLAMP_OCCUPIED).astype(np.float32), (south, west), config)
 
 
 def add(
-    total: NDArray[np.float64], pose: Pose, evidence: PolarEvidence, cell_m: float, corner: tuple[int, int]
+    total: NDArray[np.float64],
+    hints: NDArray[np.float64],
+    pose: Pose,
+    evidence: PolarEvidence,
+    cell_m: float,
+    corner: tuple[int, int],
 ) -> None:
     """Add one scan to a grid of log-odds in place: each cell looks up its own bearing and range."""
     table = evidence.log_odds
@@ -56,7 +63,10 @@ def add(
     bearing = np.floor(turn * (table.shape[0] / (2.0 * math.pi)) + 0.5).astype(np.intp) % table.shape[0]
     reached = (np.sqrt(x * x + y * y) / evidence.range_step_m).astype(np.intp)
     within = reached < table.shape[1]
-    total[rows, cols] += np.where(within, table[bearing, np.minimum(reached, table.shape[1] - 1)], 0.0)
+    told = np.where(within, table[bearing, np.minimum(reached, table.shape[1] - 1)], 0.0)
+    hint = (told > 0.0) & (told <= HINT_LOG_ODDS)
+    total[rows, cols] += np.where(hint, 0.0, told)
+    np.maximum(hints[rows, cols], np.where(hint, told, 0.0), out=hints[rows, cols])
 
 
 def _span(centre_m: float, reach_m: float, cell_m: float, first: int, size: int) -> tuple[int, int]:
