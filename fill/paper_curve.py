@@ -13,11 +13,13 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from fill.paper_fit import ORDERS, Crossed, crossed, fit
 from fill.paper_loop import NEAR
 from fill.paper_segments import Segment, find_segments
 
+_EIGHT: Final = np.ones((3, 3), np.int8)
 _LEARNABLE: Final = 9
 _SHORTEST: Final = 3
 _HOLES: Final = 8  # knocked into each segment
@@ -78,19 +80,35 @@ def certainty_curves(tally: Tally) -> dict[int, CertaintyCurve]:
 
 
 def _filled(segment: Segment, size: int, wall: NDArray[np.bool_]) -> list[tuple[int, Crossed]]:
-    """Take ``size`` steps out of the middle of a segment, and fill them by each order."""
+    """Take ``size`` steps out of the middle of a segment, and fill them by each order.
+
+    A segment that runs round a room is cut in one place only: where its middle is in several, in the first.
+    """
     start = (segment.length + 1 - size) // 2
-    gone = (segment.from_first >= start) & (segment.from_first < start + size)
-    behind = np.flatnonzero(segment.from_first == start - 1)
-    beyond = np.flatnonzero(segment.from_first == start + size)
-    if not len(behind) or not len(beyond):
+    layers = np.full((3, *wall.shape), False)
+    rows, cols = segment.cells.T
+    steps = segment.from_first
+    for layer, low, high in ((0, start, start + size), (1, start - 1, start), (2, start + size, start + size + 1)):
+        layers[layer, rows, cols] = (steps >= low) & (steps < high)
+    parts, count = ndimage.label(layers[0], _EIGHT)
+    gone = parts == 1
+    rim = ndimage.binary_dilation(gone, _EIGHT)
+    behind, beyond = np.argwhere(layers[1] & rim), np.argwhere(layers[2] & rim)
+    if not count or not len(behind) or not len(beyond):
         return []
-    left = wall.copy()
-    left[segment.cells[gone, 0], segment.cells[gone, 1]] = False
-    near = np.abs(segment.from_first - (start + (size - 1) / 2)) < size / 2 + NEAR
-    samples = segment.cells[near & ~gone]
-    first, last = segment.cells[behind[0]], segment.cells[beyond[0]]
-    return [(order, crossed(fit(samples, order, len(wall)), first, last, left)) for order in ORDERS]
+    left = wall & ~gone
+    ends = behind[0], beyond[0]
+    samples = np.concatenate([_around(end, left) for end in ends])
+    return [(order, crossed(fit(samples, order, len(wall)), *ends, left)) for order in ORDERS]
+
+
+def _around(end: NDArray[np.int64], wall: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Cells ``(n, 2)`` of wall fewer than NEAR steps from an endpoint."""
+    low = np.maximum(end - NEAR, 0)
+    window = wall[low[0] : end[0] + NEAR + 1, low[1] : end[1] + NEAR + 1]
+    seed = np.zeros(window.shape, bool)
+    seed[tuple(end - low)] = True
+    return np.argwhere(ndimage.binary_dilation(seed, _EIGHT, iterations=NEAR - 1, mask=window)) + low
 
 
 def _curve(away: NDArray[np.float64], hit: NDArray[np.bool_]) -> CertaintyCurve:
