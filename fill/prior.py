@@ -14,27 +14,27 @@ from fill.candidates import FEATURES
 from fill.certainty import Belief, Logistic
 
 _HOLE: Final = {
-    "one": (1.16, 0.71),
-    "log gap": (-0.28, 0.23),
-    "bend": (0.83, 0.44),
-    "turn": (0.23, 0.31),
-    "offset": (-1.61, 0.26),
-    "half": (0.38, 0.82),
-    "log support": (0.51, 0.15),
-    "wander": (-0.47, 0.36),
-    "near both": (0.38, 0.68),
-    "near one": (1.15, 0.38),
-    "water both": (-0.55, 0.64),
-    "water one": (0.07, 0.40),
-    "divides": (0.27, 0.53),
-    "water both, divides": (1.20, 0.77),
-    "snug": (0.79, 0.61),
-    "corner": (0.75, 0.38),
-    "side": (-1.61, 0.30),
-    "specks": (0.96, 0.76),
-    "detour": (-1.11, 0.74),
+    "one": (1.09, 0.70),
+    "log gap": (-0.14, 0.21),
+    "bend": (1.07, 0.43),
+    "turn": (0.01, 0.30),
+    "offset": (-1.67, 0.24),
+    "half": (0.39, 0.82),
+    "log support": (0.44, 0.14),
+    "wander": (-0.61, 0.30),
+    "near both": (0.12, 0.67),
+    "near one": (1.24, 0.38),
+    "water both": (-0.58, 0.62),
+    "water one": (-0.26, 0.39),
+    "divides": (0.43, 0.51),
+    "water both, divides": (1.24, 0.76),
+    "snug": (1.05, 0.61),
+    "corner": (0.85, 0.37),
+    "side": (-1.66, 0.28),
+    "specks": (1.28, 0.71),
+    "detour": (-1.21, 0.71),
 }
-_CELL: Final = ((1.15, 0.12), (0.79, 0.09), (0.00, 0.15))
+_CELL: Final = ((1.00, 0.11), (0.83, 0.09), (0.00, 0.14))
 
 
 def prior() -> Belief:

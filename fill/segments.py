@@ -24,8 +24,9 @@ EIGHT: Final = np.ones((3, 3), np.int8)
 SUPPORT: Final = 14
 """How many cells of centre line behind an end tell its direction."""
 _WEIGHTS: Final = np.linspace(1.0, 0.4, SUPPORT + 1)  # the nearest part of a wall tells most about its direction
-_BENDABLE: Final = 10  # cells of centre line from which a bend can be told
+_BENDABLE: Final = 16  # cells of centre line from which a bend can be told
 _CLEARLY: Final = 0.5
+_EVEN: Final = 0.5  # cells off the parabola: more is a corner
 _SPUR_ROUNDS: Final = 2
 _SOLID: Final = 8.0  # cells from the nearest water: deeper is not wall but the ground behind it
 
@@ -68,10 +69,7 @@ class Walls:
 
 def find_walls(mask: NDArray[np.bool_]) -> Walls:
     """Find the walls in ``mask`` ``(rows, cols)`` and their true ends, in order of row and column."""
-    padded = np.pad(mask, 1)
-    half = ndimage.distance_transform_edt(padded).astype(np.float32)
-    if half.max(initial=0.0) > _SOLID:
-        half = np.where(half > _SOLID, 0, half).astype(np.float32)
+    half = _depths(mask)
     wall = half > 0
     label = np.zeros(wall.shape, np.int32)
     ndimage.label(wall, EIGHT, output=label)
@@ -80,6 +78,17 @@ def find_walls(mask: NDArray[np.bool_]) -> Walls:
     inner = slice(1, -1), slice(1, -1)
     kept = tuple(end for end in (_end(at, lines, half, label) for at in lines.tips()) if end is not None)
     return Walls(wall[inner], label[inner], half[inner], lines.mask()[inner], kept)
+
+
+def _depths(mask: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Distance of each wall cell from the wall's edge, 0 elsewhere and deep inside solid ground; one cell wider."""
+    depth: NDArray[np.float32] = ndimage.distance_transform_edt(np.pad(mask, 1)).astype(np.float32)
+    if depth.max(initial=0.0) <= _SOLID:
+        return depth
+    # Ground that reaches the edge of the grid goes on beyond it.
+    beyond = ndimage.distance_transform_edt(np.pad(np.pad(mask, int(_SOLID) + 1, mode="edge"), 1)).astype(np.float32)
+    inner = slice(int(_SOLID) + 2, -int(_SOLID) - 2)
+    return np.pad(np.where(beyond > _SOLID, 0, beyond)[inner, inner], 1)
 
 
 class CentreLines:
@@ -147,7 +156,7 @@ def _end(at: int, lines: CentreLines, half: NDArray[np.float32], label: NDArray[
     if len(path) < 3 or len(path) + thick < 2.5 * thick + 2.0:
         return None
     line = smooth(lines.places(path))
-    tip, out, wander = direction(line[: SUPPORT + 1])
+    tip, out, wander = direction(line)
     reach = _to_edge(tip + 1.0, out, half)
     x, y = tip + out * reach
     steps = line[1:] - line[:-1]
@@ -169,27 +178,37 @@ def direction(line: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[n
     ``line`` ``(n, 2)`` begins at the tip.  A wall that bends evenly has left its mean direction by the time it ends:
     where one bend explains the line clearly better than none, foot and direction are those of the bend.
     """
-    weight = _WEIGHTS[: len(line)]
-    middle = weight @ line / weight.sum()
+    near = line[: len(_WEIGHTS)]
+    weight = _WEIGHTS[: len(near)]
+    middle = weight @ near / weight.sum()
     off = line - middle
-    xx, xy, yy = weight @ (off[:, 0] ** 2), weight @ (off[:, 0] * off[:, 1]), weight @ (off[:, 1] ** 2)
+    xx, xy, yy = (weight @ (off[: len(near), a] * off[: len(near), b]) for a, b in ((0, 0), (0, 1), (1, 1)))
     turn = 0.5 * math.atan2(2.0 * xy, xx - yy)  # the major axis of the weighted points
     out = np.array([math.cos(turn), math.sin(turn)])
-    if np.dot(line[0] - line[-1], out) < 0:
+    if np.dot(near[0] - near[-1], out) < 0:
         out = -out
     normal = np.array([-out[1], out[0]])
     along, aside = off @ out, off @ normal
-    foot, wander = middle + out * along[0], float(np.abs(aside).mean())
-    if len(line) < _BENDABLE:
-        return foot, out, wander
-    basis = np.stack([np.ones_like(along), along, along**2], axis=1)
-    bend = np.linalg.solve((basis.T * weight) @ basis + 1e-9 * np.eye(3), (basis.T * weight) @ aside)
-    left = float(np.abs(basis @ bend - aside).mean())
-    if left > _CLEARLY * wander:
-        return foot, out, wander
+    bend = _bend(along, aside)
+    if bend is None:
+        return middle + out * along[0], out, float(np.abs(aside[: len(near)]).mean())
     slope = bend[1] + 2.0 * bend[2] * along[0]
-    foot = foot + normal * (basis[0] @ bend)
-    return foot, (out + normal * slope) / math.hypot(1.0, slope), left
+    foot = middle + out * along[0] + normal * (bend[0] + bend[1] * along[0] + bend[2] * along[0] ** 2)
+    left = np.abs(bend[0] + bend[1] * along + bend[2] * along**2 - aside)
+    return foot, (out + normal * slope) / math.hypot(1.0, slope), float(left.mean())
+
+
+def _bend(along: NDArray[np.float64], aside: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """Parabola through a line, where it is long enough, fits well, and clearly better than a straight line."""
+    if len(along) < _BENDABLE:
+        return None
+    basis = np.stack([np.ones_like(along), along, along**2], axis=1)
+    straight, bend = (
+        np.linalg.solve(part.T @ part + 1e-9 * np.eye(part.shape[1]), part.T @ aside) for part in (basis[:, :2], basis)
+    )
+    before = float(np.abs(basis[:, :2] @ straight - aside).mean())
+    after = float(np.abs(basis @ bend - aside).mean())
+    return np.asarray(bend, np.float64) if after < min(_CLEARLY * before, _EVEN) else None
 
 
 def _to_edge(tip: NDArray[np.float64], out: NDArray[np.float64], half: NDArray[np.float32]) -> float:
