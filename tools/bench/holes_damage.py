@@ -9,19 +9,17 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
-from skimage.morphology import skeletonize
 
 from mapping.values import FREE, OCCUPIED, UNKNOWN
 from tools.bench.holes_gates import Gate, find_gates
 from tools.bench.holes_loss import LONGEST, Damaged, Kind, Loss, owners
-from tools.bench.holes_walk import Cell, walk_both_ways
+from tools.bench.holes_walk import Cell, centre_lines, walk_both_ways
 
 _STRETCHES: Final = 6
 _SHADOWS: Final = 2
 _OPENINGS: Final = 4
 _TRIES: Final = 15
 _SHORTEST: Final = 3.0
-_WALL: Final = 12  # cells of centre line that make a wall; less is clutter
 _APART: Final = 12  # cells between two losses
 _EIGHT: Final = np.ones((3, 3), np.int8)
 
@@ -49,7 +47,7 @@ def damage(name: str, truth: NDArray[np.uint8], random: np.random.Generator) -> 
         truth, truth.copy(), centre_lines(wall), ndimage.distance_transform_edt(wall),
         np.zeros(truth.shape, bool), np.zeros(truth.shape, bool),
     )  # fmt: skip
-    gates = find_gates(truth)
+    gates = find_gates(truth, work.centre)
     for number, index in enumerate(random.permutation(len(gates))[:_OPENINGS]):
         _open(work, gates[int(index)], "opening unseen" if number % 2 == 0 else "opening seen", random)
     for make, count in ((_shade, _SHADOWS), (_stretch, _STRETCHES)):
@@ -59,13 +57,6 @@ def damage(name: str, truth: NDArray[np.uint8], random: np.random.Generator) -> 
             if made == count:
                 break
     return Damaged(name, truth, work.seen, tuple(work.losses), owners(truth.shape, work.losses, work.unjudged))
-
-
-def centre_lines(wall: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Centre lines of walls, clutter left out."""
-    lines = np.asarray(skeletonize(wall), np.bool_)  # type: ignore[no-untyped-call]
-    parts, count = ndimage.label(lines, _EIGHT)
-    return np.asarray(lines & (np.bincount(parts.ravel(), minlength=count + 1)[parts] >= _WALL), np.bool_)
 
 
 def _open(work: _Work, gate: Gate, kind: Kind, random: np.random.Generator) -> None:

@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from skimage.draw import line as line_cells
 
-from fill.segments import End, find_walls
-from mapping.values import FREE, OCCUPIED
+from mapping.values import FREE
+from tools.bench.holes_walk import tips
 
 _NARROWEST: Final = 5.0
 _WIDEST: Final = 40.0
 _FACING: Final = 0.75  # cosine
 _ROOM: Final = 3.0  # cells about an opening that belong to its passage
+_BEHIND: Final = 8  # cells of wall behind an end that tell its direction
 _FREE: Final = 0.9  # of the line between the jambs
 
 
@@ -32,13 +33,13 @@ class Gate:
     banks: NDArray[np.int64]
 
 
-def find_gates(truth: NDArray[np.uint8]) -> list[Gate]:
-    """Find openings of 5 to 40 cells whose water was seen and which lead from one side to the other."""
-    ends = find_walls(truth == OCCUPIED).ends
+def find_gates(truth: NDArray[np.uint8], centre: NDArray[np.bool_]) -> list[Gate]:
+    """Find openings of 5 to 40 cells between ends of ``centre`` lines, whose water was seen and leads through."""
+    ends = tips(centre, _BEHIND)
     found = []
     for index, a in enumerate(ends):
         for b in ends[index + 1 :]:
-            gap = math.hypot(b.x - a.x, b.y - a.y)
+            gap = math.hypot(*(b[:2] - a[:2]))
             if _NARROWEST <= gap <= _WIDEST and _face(a, b, gap) and (gate := _gate(a, b, gap, truth)) is not None:
                 found.append(gate)
     return found
@@ -54,33 +55,34 @@ def shut(banks: NDArray[np.int64], solid: NDArray[np.bool_]) -> bool:
     return not np.intersect1d(parts[side == 1], parts[side == 2]).size
 
 
-def _face(a: End, b: End, gap: float) -> bool:
-    along_x, along_y = (b.x - a.x) / gap, (b.y - a.y) / gap
-    return min(a.dx * along_x + a.dy * along_y, -b.dx * along_x - b.dy * along_y) >= _FACING
+def _face(a: NDArray[np.float64], b: NDArray[np.float64], gap: float) -> bool:
+    along = (b[:2] - a[:2]) / gap
+    return bool(min(a[2:] @ along, -b[2:] @ along) >= _FACING)
 
 
-def _gate(a: End, b: End, gap: float, truth: NDArray[np.uint8]) -> Gate | None:
+def _gate(a: NDArray[np.float64], b: NDArray[np.float64], gap: float, truth: NDArray[np.uint8]) -> Gate | None:
     share = np.linspace(0.15, 0.85, int(2 * gap))
-    row = np.clip(np.rint(a.y + share * (b.y - a.y)), 0, truth.shape[0] - 1).astype(np.int64)
-    col = np.clip(np.rint(a.x + share * (b.x - a.x)), 0, truth.shape[1] - 1).astype(np.int64)
+    row, col = np.rint(a[:2, None] + share * (b[:2] - a[:2])[:, None]).astype(np.int64)
     if np.mean(truth[row, col] == FREE) < _FREE:
         return None
-    middle = (a.y + b.y) / 2, (a.x + b.x) / 2
-    banks = _banks(middle, a, b, gap, truth)
+    banks = _banks(a, b, gap, truth)
     solid = truth != FREE
     if not all(np.any((banks[:, 2] == side) & ~solid[banks[:, 0], banks[:, 1]]) for side in (1, 2)):
         return None
     if shut(banks, solid):
         return None
-    cells = line_cells(int(row[0]), int(col[0]), int(row[-1]), int(col[-1]))  # type: ignore[no-untyped-call]
-    return Gate(*middle, gap, np.stack(cells, axis=1).astype(np.int64), banks)
+    cells = np.stack(line_cells(row[0], col[0], row[-1], col[-1]), axis=1)  # type: ignore[no-untyped-call]
+    middle = (a[:2] + b[:2]) / 2
+    free = cells[truth[cells[:, 0], cells[:, 1]] == FREE].astype(np.int64)
+    return Gate(float(middle[0]), float(middle[1]), gap, free, banks)
 
 
-def _banks(middle: tuple[float, float], a: End, b: End, gap: float, truth: NDArray[np.uint8]) -> NDArray[np.int64]:
+def _banks(a: NDArray[np.float64], b: NDArray[np.float64], gap: float, truth: NDArray[np.uint8]) -> NDArray[np.int64]:
+    """Cells of the passage about an opening, and on which side of it each lies."""
     rows, cols = np.meshgrid(np.arange(truth.shape[0]), np.arange(truth.shape[1]), indexing="ij")
-    down, right = rows - middle[0], cols - middle[1]
+    down, right = rows - (a[0] + b[0]) / 2, cols - (a[1] + b[1]) / 2
     inside = np.hypot(down, right) <= gap / 2 + _ROOM
-    across = (down * (b.x - a.x) - right * (b.y - a.y)) / gap
+    across = (down * (b[1] - a[1]) - right * (b[0] - a[0])) / gap
     edge = gap / 4 + 1.0
     side = np.where(truth != FREE, 0, np.where(across > edge, 1, np.where(across < -edge, 2, 0)))
     return np.stack([rows[inside], cols[inside], side[inside]], axis=1)

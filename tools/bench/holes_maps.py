@@ -23,7 +23,8 @@ from tools.maps import read_map
 PRIOR_SAW: Final = frozenset({"nav2_map_labtech", "dmro_mapjuly", "building_31", "aces", "fhw", "infinite-corridor"})
 """Maps that the prior of certainties was learnt on: figures on these are flattered."""
 _SALT: Final = "720/"
-_SIDE: Final = 240  # cells of a piece
+_SIDE: Final = 236  # cells of a piece without its margin
+_MARGIN: Final = 2  # cells never seen about a piece: no map of ours ends at a wall
 _TRIES: Final = 40
 _FEWEST: Final = 150  # wall cells
 _DEPTH: Final = 3.0  # cells into the rock that a sonar tells of; some maps paint all ground as wall
@@ -87,5 +88,5 @@ def pieces(state: NDArray[np.uint8], count: int, random: np.random.Generator) ->
         row, col = np.clip(place, 0, np.maximum(np.array(state.shape) - _SIDE, 0)).tolist()
         piece = np.ascontiguousarray(state[row : row + _SIDE, col : col + _SIDE])
         if np.count_nonzero(piece == OCCUPIED) >= _FEWEST:
-            cut.append(piece)
+            cut.append(np.pad(piece, _MARGIN, constant_values=UNKNOWN))
     return cut

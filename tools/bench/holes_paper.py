@@ -19,10 +19,9 @@ from scipy import ndimage
 
 from fill.paper_curve import knock_outs
 from mapping.values import FREE, OCCUPIED, UNKNOWN
-from tools.bench.holes_damage import centre_lines
 from tools.bench.holes_maps import Source, read_state
 from tools.bench.holes_methods import Method, ours, paper_as_printed
-from tools.bench.holes_walk import walk_both_ways
+from tools.bench.holes_walk import centre_lines, walk_both_ways
 
 Row = dict[str, str | int | float]
 
