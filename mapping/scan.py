@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from config.schema import Map
 from drivers.readings import Altitude, Depth, Heading, Ping, Reading
 from mapping.compass import Track
-from mapping.rest import SECTOR_BEAMS, Agreement, common_to_all, compare, profile, still
+from mapping.passage import Passage
+from mapping.rest import FROZEN, SECTOR_BEAMS, Agreement, common_to_all, compare, frozen, grain_of, profile, still
 from mapping.turns import (
     TURN,
     Beam,
@@ -39,24 +40,23 @@ CONFIRM_LEFT_RAD = math.radians(80.0)
 """... or this much, where the vehicle then leaves and its heading was steady."""
 CONFIRM_END_RAD = math.radians(30.0)
 """... or this much, where the log ends."""
+LOOSE_PINGS = 600  # ... and so many on end where the walls agree and their grain, frozen at an earlier rest, does not
 STEADY_RAD = math.radians(12.0)
 """The heading's range within a circle at rest and the beams that confirm it."""
 STEADY_LATE_RAD = math.radians(4.0)
-SWEEP_SHARE = 0.75
-"""Share of a sector sweep that the sweep back must confirm."""
-PARTIAL_RAD = math.radians(60.0)
-"""Arcs smaller than this are no scan."""
-UNSTEADY_PINGS = 10
-"""Consecutive beams that disagree: the vehicle moves."""
-LEFT_OF, LEFT_SHARE = 100, 0.5
-"""A rest is over when so many of the last beams disagree: after a move, those of a whole turn do."""
+SWEEP_SHARE = 0.75  # of a sector sweep, which the sweep back must confirm
+PARTIAL_RAD = math.radians(60.0)  # smaller arcs are no scan
+UNSTEADY_PINGS = 10  # beams on end that disagree: the vehicle moves
+LEFT_OF, LEFT_SHARE = 100, 0.5  # a rest is over when so many of the last beams disagree
 RACE_RAD_S = math.radians(8.0)
 DEPTH_STEP_M = 0.4
 COMMON_PINGS, COMMON_OF = 16, 256
 """What is common to all bearings is found anew every so many pings, from so many."""
+GRAINY = 0.75
+"""Median correlation of the grain at a rest from which its loss tells motion in this dive."""
+GRAIN_BEAMS = 64  # of those that agree, whose grain is asked for
 KEEP_TURNS = 2.2
-MAX_PINGS = 8192
-"""Bound of the buffer when the head does not turn."""
+MAX_PINGS = 8192  # bound of the buffer when the head does not turn
 
 Quality = Literal["full", "partial", "moving"]
 
@@ -70,6 +70,8 @@ class ScanBuilder:
         self._depths = Track(angular=False)
         self._held: list[Ping] = []
         self._count = 0
+        self._passage = Passage()
+        self._grainy = False  # whether speckle was frozen at an earlier rest
         self._restart()
 
     def push(self, reading: Reading) -> list[Scan]:
@@ -96,13 +98,16 @@ class ScanBuilder:
     def _restart(self) -> None:
         self._beams: list[Beam] = []
         self._recent: list[Agreement] = []
-        self._run: list[tuple[int, int]] = []  # steady beams and their partners, as indices into _beams
+        self._run: list[tuple[int, int, float]] = []  # steady beams, their partners (in _beams), and their grain
+        self._frozen = 0  # beams on end whose grain is frozen
+        self._still_frozen = False  # whether grain tells the end of this rest
         self._common_profile = np.zeros(0)
         self._common_age = 0
         self._verdicts: list[bool] = []
         self._unsteady = 0
         self._resting = False
         self._moved = False
+        self._loose = 0  # beams on end that agree without their grain
 
     def _release(self, now_ns: int) -> list[Scan]:
         scans: list[Scan] = []
@@ -119,8 +124,10 @@ class ScanBuilder:
         if self._beams and not same_settings(self._beams[-1].ping, ping):
             scans = self._close()
             self._restart()
+            self._passage.lose()
         shape = profile(ping.echoes, ping.bin_m, self._config.min_range_m)
         self._beams.append(next_beam(self._beams, ping, self._heading(ping.t_ns), shape))
+        self._passage.add(self._beams[-1], resting=self._resting)
         earlier = partner(self._beams)
         if earlier is not None:
             scans += self._judge(earlier)
@@ -134,29 +141,38 @@ class ScanBuilder:
 
     def _judge(self, earlier: int) -> list[Scan]:
         now, before = self._beams[-1], self._beams[earlier]
-        self._recent.append(compare(now.profile, before.profile, self._common(), now.ping.bin_m))
+        products = grain_of(now.ping.echoes, before.ping.echoes, now.ping.bin_m, self._config.min_range_m)
+        self._recent.append(compare(now.profile, before.profile, self._common(), now.ping.bin_m, products))
         del self._recent[:-COMMON_OF]
         verdict = still(self._recent[-SECTOR_BEAMS:], float(np.median([a.energy for a in self._recent])))
         if self._races(now, before):
             verdict = False
         if verdict is None:
             return []
+        grain = frozen(self._recent[-SECTOR_BEAMS:])
+        if self._still_frozen and grain < FROZEN:
+            verdict = False
+        self._frozen = self._frozen + 1 if grain >= FROZEN else 0
         self._verdicts.append(verdict)
         del self._verdicts[:-LEFT_OF]
         if self._resting:
             self._watch()
             return []
-        return self._agree(earlier) if verdict else self._disagree()
+        return self._agree(earlier, grain) if verdict else self._disagree()
 
     def _watch(self) -> None:
         """Watch for the end of a rest whose scan was given."""
-        if self._verdicts.count(False) >= LEFT_SHARE * LEFT_OF:
-            self._resting, self._moved, self._unsteady = False, True, 0
+        begun = self._grainy and not self._still_frozen and self._frozen >= GRAIN_BEAMS
+        if begun or self._verdicts.count(False) >= LEFT_SHARE * LEFT_OF:
+            self._resting, self._moved, self._unsteady, self._still_frozen = False, True, 0, False
             self._run.clear()
 
-    def _agree(self, earlier: int) -> list[Scan]:
+    def _agree(self, earlier: int, grain: float) -> list[Scan]:
         self._unsteady = 0
-        self._run.append((len(self._beams) - 1, earlier))
+        if grain >= FROZEN and self._is_loose():
+            self._run.clear()  # the end of a drive along smooth walls
+        self._loose = self._loose + 1 if grain < FROZEN else 0
+        self._run.append((len(self._beams) - 1, earlier, grain))
         heading = self._beams[-1].heading_rad
         while abs(self._beams[self._run[0][1]].heading_rad - heading) > STEADY_RAD:
             del self._run[0]
@@ -170,6 +186,7 @@ class ScanBuilder:
             return []
         scans = self._emit(0.5) if self._confirmed_late(CONFIRM_LEFT_RAD) else []
         self._moved = True
+        self._loose = 0
         self._run.clear()
         return scans
 
@@ -189,9 +206,18 @@ class ScanBuilder:
             return False
         return abs(self._depths.at(now.ping.t_ns) - self._depths.at(before.ping.t_ns)) > DEPTH_STEP_M
 
+    def _is_loose(self) -> bool:
+        """Whether the grain of the beams that agree speaks of motion."""
+        return self._grainy and self._grain() < FROZEN
+
+    def _grain(self) -> float:
+        """Median correlation of the grain over the beams that agree; 1 where nothing is told."""
+        told = [grain for _, _, grain in self._run[-GRAIN_BEAMS:] if not math.isnan(grain)]
+        return float(np.median(told)) if told else 1.0
+
     def _confirmed_late(self, needed_rad: float) -> bool:
         enough = self._agreed_rad() >= needed_rad and self._swing_rad() <= STEADY_LATE_RAD
-        return enough and not self._resting and not self._sweeping()
+        return enough and not self._resting and not self._sweeping() and not self._is_loose()
 
     def _agreed_rad(self) -> float:
         if not self._run:
@@ -208,7 +234,7 @@ class ScanBuilder:
 
     def _needed_rad(self) -> float:
         if not self._sweeping():
-            return CONFIRM_RAD
+            return math.inf if self._is_loose() and self._loose < LOOSE_PINGS else CONFIRM_RAD
         return max(CONFIRM_RAD, SWEEP_SHARE * swept_rad(self._beams, self._beams[self._run[-1][1]].leg))
 
     def _emit(self, settled: float) -> list[Scan]:
@@ -217,8 +243,10 @@ class ScanBuilder:
         ``settled`` chooses the circle, 0 the first, 1 the last: the first ones may hold the end of the drift in, the
         last ones the beginning of the way out.
         """
-        first, earlier = self._run[int(settled * (len(self._run) - 1))]
+        first, earlier, _ = self._run[int(settled * (len(self._run) - 1))]
         self._verdicts.clear()
+        self._still_frozen = self._grain() > GRAINY and not math.isnan(self._run[-1][2])
+        self._grainy |= self._still_frozen
         leg = self._beams[self._run[-1][1]].leg
         self._resting = True
         if self._sweeping():
@@ -254,7 +282,9 @@ class ScanBuilder:
             bin_m=beams[0].ping.bin_m,
             step_rad=step_of(beams),
             quality=quality,
+            way=self._passage.way_to(start_ns),
         )
+        self._passage.begin([b for b in self._beams if b.ping.t_ns > end_ns])
         self._count += 1
         return [scan]
 
@@ -267,4 +297,4 @@ class ScanBuilder:
         if first < 64:
             return
         del self._beams[:first]
-        self._run = [(i - first, j - first) for i, j in self._run if j >= first]
+        self._run = [(i - first, j - first, grain) for i, j, grain in self._run if j >= first]

@@ -27,13 +27,33 @@ class Pose:
 
 
 @dataclass(frozen=True, slots=True)
+class Way:
+    """Pings taken under way, from one scan to the next, in the order in which they came.
+
+    ``t_ns`` ``(n,)`` int64, ``direction_rad`` ``(n,)`` float64 each beam's compass direction (heading and bearing),
+    ``echoes`` ``(n, n_bins)`` uint8, ``bin_m`` and ``step_rad`` as in the scan that the way led to.
+    """
+
+    t_ns: NDArray[np.int64]
+    direction_rad: NDArray[np.float64]
+    echoes: NDArray[np.uint8]
+    bin_m: float
+    step_rad: float
+
+    def back(self) -> Way:
+        """Give the same way, gone backwards."""
+        return Way(-self.t_ns[::-1], self.direction_rad[::-1], self.echoes[::-1], self.bin_m, self.step_rad)
+
+
+@dataclass(frozen=True, slots=True)
 class Scan:
     """A circle (or a part of one) of pings made at rest.
 
     ``heading_rad`` is the compass heading of reference, ``bearing_rad`` ``(n,)`` float64 each ping's bearing from that
     heading (the compass's change during the scan is already in it), ``echoes`` ``(n, n_bins)`` uint8.  Beams are in the
     order in which they came.  ``quality`` is ``full`` for a whole circle at rest, ``partial`` for less than a circle,
-    ``moving`` where the scan's own beams disagree.  ``depth_m`` is nan where no depth was told.
+    ``moving`` where the scan's own beams disagree.  ``depth_m`` is nan where no depth was told.  ``way`` holds the
+    pings since the scan before, None where the way was not seen whole.
     """
 
     index: int
@@ -46,6 +66,7 @@ class Scan:
     bin_m: float
     step_rad: float
     quality: Literal["full", "partial", "moving"]
+    way: Way | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,9 +90,9 @@ class Station:
     """A scan with its place in the map, or with the reason why it has none.
 
     ``covariance`` is ``(3, 3)`` float64 over x_m, y_m, heading_rad.  ``piece`` numbers the connected parts of the
-    map; piece 0 holds the first station.  ``margin`` is the log-posterior of the pose above the best one elsewhere
-    (nan for the first station).  ``why`` is one sentence for the pilot.  Only ``placed`` stations are in the
-    evidence.
+    map; piece 0 holds the first station, and the poses of another piece are a guess as a whole.  ``margin`` is the
+    log-posterior of the pose above the best one elsewhere (nan for the first station).  ``why`` is one sentence for
+    the pilot.  Only ``placed`` stations are in the evidence.
     """
 
     scan: Scan
