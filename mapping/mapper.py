@@ -5,7 +5,9 @@ from __future__ import annotations
 from config.schema import Map
 from mapping import grid as grids
 from mapping.echoes import pick
-from mapping.stations import Hint, Stations, sight_of
+from mapping.prior import Hint
+from mapping.sight import sight_of
+from mapping.stations import Stations
 from mapping.values import Grid, Scan, Station
 
 

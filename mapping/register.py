@@ -15,13 +15,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mapping.prior import Prior
 from mapping.values import Pose
-from mapping.view import Field, View, to_map
+from mapping.view import View, to_map
 
 SIGMAS_M = (0.5, 0.4, 0.3, 0.24, 0.19, 0.15, 0.12, 0.1)
 """Widths of a wall, from the first step of the filter to the last."""
 SIGMA_M = 0.1
 """Width of a wall without annealing."""
+SECOND_LOOK_M = 0.24
+"""At this width the prior is asked once more: wide walls may lead to where little is known."""
 TEMPER = 0.5
 """Power of the likelihood in resampling."""
 JITTER_M = 0.5
@@ -35,37 +38,6 @@ FEW = 0.1
 """Share of known points below which dividing by it stops."""
 ELSEWHERE_M = 0.6
 """Poses nearer than this are the same answer."""
-EDGE_M = 0.3
-"""Softness of the edge of the prior's disc."""
-
-
-@dataclass(frozen=True, slots=True)
-class Prior:
-    """Where the scan may have been made: a disc of ``reach_m`` about a place, or a normal with ``sd_m``."""
-
-    x_m: float
-    y_m: float
-    reach_m: float
-    heading_rad: float
-    heading_sd_rad: float
-    gaussian: bool = False
-
-    def draw(self, n: int, rng: np.random.Generator) -> NDArray[np.float64]:
-        """Draw ``(n, 3)`` poses."""
-        if self.gaussian:
-            xy = rng.normal(0.0, self.reach_m, (n, 2))
-        else:
-            radius, turn = self.reach_m * np.sqrt(rng.random(n)), rng.random(n) * 2.0 * math.pi
-            xy = np.stack([radius * np.cos(turn), radius * np.sin(turn)], axis=1)
-        heading = self.heading_rad + rng.normal(0.0, self.heading_sd_rad, n)
-        return np.column_stack([self.x_m + xy[:, 0], self.y_m + xy[:, 1], heading])
-
-    def log_density(self, poses: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Log-density ``(n,)`` of poses ``(n, 3)``, up to a constant."""
-        away = np.hypot(poses[:, 0] - self.x_m, poses[:, 1] - self.y_m)
-        off = away / self.reach_m if self.gaussian else np.maximum(away - self.reach_m, 0.0) / EDGE_M
-        turn = (poses[:, 2] - self.heading_rad + math.pi) % (2.0 * math.pi) - math.pi
-        return np.asarray(-0.5 * (off**2 + (turn / self.heading_sd_rad) ** 2), dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +46,7 @@ class Match:
 
     ``overlap`` is the share of the scan's weight that lies on known walls; ``weak_rad`` the direction (clockwise from
     north, in [0, pi)) in which the walls hold it least, and ``hold`` the information there, 0 to 0.5 of the whole.
+    ``astray`` tells how many standard deviations the pose is from the prior's cloud, 0 without one.
     ``height`` is the log-posterior, ``fit`` the same per independent point, ``other`` the best pose elsewhere.
     """
 
@@ -86,6 +59,7 @@ class Match:
     height: float
     fit: float
     other: Pose
+    astray: float
 
 
 class Likelihood:
@@ -125,22 +99,14 @@ class Likelihood:
         """Cells of the reference's field in which the scan's points fall, ``(n, points)``."""
         c, s = np.cos(poses[:, 2])[:, None], np.sin(poses[:, 2])[:, None]
         x, y = self._scan.points.xy_m[:, 0], self._scan.points.xy_m[:, 1]
-        return _cells(self._reference.field, poses[:, :1] + c * x + s * y, poses[:, 1:2] - s * x + c * y)
+        return self._reference.field.cells(poses[:, :1] + c * x + s * y, poses[:, 1:2] - s * x + c * y)
 
     def _cells_back(self, poses: NDArray[np.float64]) -> NDArray[np.int32]:
         """Cells of the scan's field in which the reference's points fall, ``(n, points)``."""
         c, s = np.cos(poses[:, 2])[:, None], np.sin(poses[:, 2])[:, None]
         dx = self._reference.points.xy_m[:, 0] - poses[:, :1]
         dy = self._reference.points.xy_m[:, 1] - poses[:, 1:2]
-        return _cells(self._scan.field, c * dx - s * dy, s * dx + c * dy)
-
-
-def _cells(field: Field, x_m: NDArray[np.float64], y_m: NDArray[np.float64]) -> NDArray[np.int32]:
-    """Flat indices of places in a field; beyond its border the border's own, where nothing is known."""
-    rows, cols = field.free.shape
-    col = np.clip((x_m - field.x0_m) / field.cell_m, 0, cols - 1).astype(np.int32)
-    row = np.clip((y_m - field.y0_m) / field.cell_m, 0, rows - 1).astype(np.int32)
-    return np.asarray(row * np.int32(cols) + col, dtype=np.int32)
+        return self._scan.field.cells(c * dx - s * dy, s * dx + c * dy)
 
 
 def register(scan: View, reference: View, prior: Prior, particles: int, rng: np.random.Generator) -> Match:
@@ -153,8 +119,9 @@ def register(scan: View, reference: View, prior: Prior, particles: int, rng: np.
     mean, covariance = local_moments(like, best)
     weak, hold = weakest_direction(scan, reference, mean)
     on_walls = overlap(scan, reference, mean)
-    fit = height / max(like.witnesses, 1.0)
-    return Match(_pose(mean), covariance, height - other_height, on_walls, weak, hold, height, fit, _pose(other))
+    fit = float(like.score(best[None, :], SIGMA_M)[0])
+    margin, astray = height - other_height, prior.astray(mean)
+    return Match(_pose(mean), covariance, margin, on_walls, weak, hold, height, fit, _pose(other), astray)
 
 
 def _pose(state: NDArray[np.float64]) -> Pose:
@@ -167,8 +134,10 @@ def search(
     """Anneal particles from the prior to the best pose ``(3,)``, not within ``ELSEWHERE_M`` of the barred one."""
     poses = prior.draw(particles, rng)
     for sigma in SIGMAS_M:
+        if sigma == SECOND_LOOK_M:
+            poses = np.concatenate([poses, prior.draw(particles, rng)])
         log_p = TEMPER * _bar(like.log_posterior(poses, sigma), poses, barred)
-        poses = poses[_resample(log_p, rng)]
+        poses = poses[_resample(log_p, particles, rng)]
         poses[:, :2] += rng.normal(0.0, JITTER_M * sigma, (particles, 2))
         poses[:, 2] += rng.normal(0.0, JITTER_M * sigma / LEVER_M, particles)
     for spread in (0.05, 0.025, 0.0125):
@@ -189,12 +158,11 @@ def _bar(
     return np.where(near, -1e6, log_p)
 
 
-def _resample(log_p: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.intp]:
+def _resample(log_p: NDArray[np.float64], n: int, rng: np.random.Generator) -> NDArray[np.intp]:
     """Draw particles by weight, systematically: ``(n,)`` indices."""
     total = np.cumsum(np.exp(log_p - log_p.max()))
-    n = len(log_p)
     drawn: NDArray[np.intp] = np.searchsorted(total, (np.arange(n) + rng.random()) / n * total[-1])
-    return np.minimum(drawn, n - 1)
+    return np.minimum(drawn, len(total) - 1)
 
 
 def local_moments(like: Likelihood, best: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -226,7 +194,7 @@ def overlap(scan: View, reference: View, pose: NDArray[np.float64]) -> float:
 
 def _near(scan: View, reference: View, pose: NDArray[np.float64]) -> NDArray[np.float64]:
     xy = to_map(_pose(pose), scan.points.xy_m)
-    distance_m = reference.field.distance_m.ravel().take(_cells(reference.field, xy[:, 0], xy[:, 1]))
+    distance_m = reference.field.distance_m.ravel().take(reference.field.cells(xy[:, 0], xy[:, 1]))
     return np.asarray(distance_m < 2.0 * SIGMA_M, dtype=np.float64)
 
 

@@ -24,6 +24,10 @@ HIT_UNKNOWN = 0.3
 """... and of one where nothing is known: neutral."""
 TRUSTED_SD_M = 0.08
 """Returns with a larger standard deviation count less."""
+VAGUE_SD_M = 0.14
+"""Returns from here on tell little of the place ..."""
+VAGUE_TRUST = 0.08
+"""... because along a tunnel they make ends that travel with the vehicle."""
 WALL_LOG_ODDS = 0.4
 """Cells above this are walls to registration: it may use vague ones too."""
 KNOWN_M = 0.3
@@ -57,6 +61,13 @@ class Field:
         odds = near + np.where(self.free, HIT_FREE, HIT_UNKNOWN)
         return np.log(odds / HIT_UNKNOWN).astype(np.float32)
 
+    def cells(self, x_m: NDArray[np.float64], y_m: NDArray[np.float64]) -> NDArray[np.int32]:
+        """Flat indices of places; beyond the border the border's own, where nothing is known."""
+        rows, cols = self.free.shape
+        col = np.clip((x_m - self.x0_m) / self.cell_m, 0, cols - 1).astype(np.int32)
+        row = np.clip((y_m - self.y0_m) / self.cell_m, 0, rows - 1).astype(np.int32)
+        return np.asarray(row * np.int32(cols) + col, dtype=np.int32)
+
     def known(self) -> NDArray[np.float32]:
         """1 where a point would be judged, in free water or at a wall, else 0, ``(rows, cols)``."""
         return (self.free | (self.distance_m < KNOWN_M)).astype(np.float32)
@@ -74,7 +85,7 @@ def wall_points(bearing_rad: NDArray[np.float64], returns: Returns) -> tuple[NDA
     """Places of the returns ``(n, 2)`` in the vehicle's axes (x right, y ahead), and their trust ``(n,)``, 0 to 1."""
     seen = np.isfinite(returns.range_m)
     r, b = returns.range_m[seen], bearing_rad[seen]
-    trust = np.minimum(1.0, TRUSTED_SD_M / returns.sd_m[seen])
+    trust = np.where(returns.sd_m[seen] < VAGUE_SD_M, np.minimum(1.0, TRUSTED_SD_M / returns.sd_m[seen]), VAGUE_TRUST)
     return np.stack([r * np.sin(b), r * np.cos(b)], axis=1), trust
 
 

@@ -1,0 +1,45 @@
+"""A scan made ready: what it says of the water around it, and how registration sees it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from config.schema import Map
+from mapping import grid as grids
+from mapping.beam import PolarEvidence, polar_evidence
+from mapping.values import Pose, Returns, Scan
+from mapping.view import View, field_of, points_of, wall_points
+
+
+@dataclass(frozen=True, slots=True)
+class Sight:
+    """A scan, its returns, its evidence for the grid, and its view for registration."""
+
+    scan: Scan
+    returns: Returns
+    evidence: PolarEvidence
+    view: View
+
+
+def sight_of(scan: Scan, returns: Returns, config: Map) -> Sight:
+    """Make a scan ready for registration and for the grid."""
+    evidence = polar_evidence(scan, returns, math.radians(config.beam_deg), config.cell_m)
+    alone = grids.render([(Pose(0.0, 0.0, 0.0), evidence)], config)
+    points = points_of(*wall_points(scan.bearing_rad, returns))
+    return Sight(scan, returns, evidence, View(points, field_of(alone)))
+
+
+def shifted(sight: Sight, by_m: float, config: Map) -> Sight:
+    """Move all walls away from the vehicle, as a taper between two depths does about a well's axis."""
+    r = sight.returns
+    moved = Returns(np.maximum(r.range_m + by_m, 0.05), r.sd_m, np.maximum(r.free_m + by_m, 0.0))
+    return sight_of(sight.scan, moved, config)
+
+
+def rise_m(a: Scan, b: Scan) -> float:
+    """Difference of two scans' depths; 0 where one was not told."""
+    rise = abs(a.depth_m - b.depth_m)
+    return 0.0 if math.isnan(rise) else rise
