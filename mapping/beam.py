@@ -109,16 +109,18 @@ def polar_evidence(scan: Scan, returns: Returns, beam_rad: float, cell_m: float)
     log_odds = np.where(ranges < clear_m[:, None], FREE_LOG_ODDS, 0.0).astype(np.float32)
     vague = hinted[:, None] & (np.abs(ranges - fan.range_m[:, None]) < fan.sd_m[:, None]) & (log_odds == 0.0)
     log_odds[vague] = VAGUE_LOG_ODDS
-    for fine in np.flatnonzero(drawn):
-        first, last = np.searchsorted(
-            ranges, (clear_m[fine], fan.range_m[fine] + 4.0 * sd[fine] + 2.0 * cell_m + BACK_M)
-        )
-        log_odds[fine, first:last] = of_face(ranges[first:last] - fan.range_m[fine], sd[fine], cell_m)
+    faces = np.flatnonzero(drawn)
+    far_m = fan.range_m[faces] + 4.0 * sd[faces] + 2.0 * cell_m + BACK_M
+    first, last = np.searchsorted(ranges, clear_m[faces]), np.searchsorted(ranges, far_m)
+    at = first[:, None] + np.arange(int((last - first).max(initial=0)))
+    row, column = np.nonzero(at < last[:, None])
+    fine, at = faces[row], at[row, column]
+    log_odds[fine, at] = of_face(ranges[at] - fan.range_m[fine], sd[fine], cell_m)
     return PolarEvidence(log_odds, step_m)
 
 
-def of_face(behind_m: NDArray[np.float64], sd_m: float, cell_m: float) -> NDArray[np.float64]:
-    """Log-odds of cells whose centres lie ``behind_m`` behind a wall's face as it was measured."""
+def of_face(behind_m: NDArray[np.float64], sd_m: NDArray[np.float64], cell_m: float) -> NDArray[np.float64]:
+    """Log-odds ``(n,)`` of cells whose centres lie ``behind_m`` behind faces of walls as they were measured."""
     half, thick = 0.5 * cell_m, THICK * cell_m
     before = 0.5 * (1.0 - erf((behind_m + half) / (sd_m * math.sqrt(2.0))))
     past = 0.5 * (1.0 + erf((behind_m - half - thick) / (sd_m * math.sqrt(2.0))))

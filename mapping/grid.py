@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,37 @@ MARGIN_CELLS = 2
 Placed = tuple[Pose, PolarEvidence]
 
 
+@dataclass(frozen=True, slots=True)
+class Cells:
+    """What one scan says at its pose, cell by cell: ``row``, ``col`` ``(k,)`` int64 from the origin, each cell once.
+
+    ``log_odds`` ``(k,)`` float32 are not 0.
+    """
+
+    row: NDArray[np.int64]
+    col: NDArray[np.int64]
+    log_odds: NDArray[np.float32]
+
+
+class Canvas:
+    """Draws grids, and works out a scan's cells anew only where its pose changed; the grid is the same to the byte."""
+
+    def __init__(self, config: Map) -> None:
+        self._config = config
+        self._kept: dict[tuple[int, Pose], tuple[PolarEvidence, Cells]] = {}
+
+    def render(self, placed: Sequence[Placed]) -> Grid:
+        """Draw scans at their poses; what is not drawn is forgotten."""
+        drawn = [self._cells(pose, evidence) for pose, evidence in placed]
+        # The evidence is kept with its cells, so that its id stays its own.
+        self._kept = {(id(e), p): (e, cells) for (p, e), cells in zip(placed, drawn, strict=True)}
+        return gather(drawn, self._config)
+
+    def _cells(self, pose: Pose, evidence: PolarEvidence) -> Cells:
+        known = self._kept.get((id(evidence), pose))
+        return known[1] if known is not None else cells_of(pose, evidence, self._config.cell_m)
+
+
 def empty(config: Map) -> Grid:
     """Give a grid of no cells."""
     return Grid(config.cell_m, 0.0, 0.0, np.zeros((0, 0), np.float32), np.zeros((0, 0), np.uint8))
@@ -27,65 +59,57 @@ def empty(config: Map) -> Grid:
 
 def render(placed: Sequence[Placed], config: Map) -> Grid:
     """Draw scans at their poses into a grid as large as they need, its edges on multiples of the cell."""
-    if not placed:
-        return empty(config)
-    cell = config.cell_m
-    reach = [evidence.log_odds.shape[1] * evidence.range_step_m for _, evidence in placed]
-    west = math.floor(min(p.x_m - r for (p, _), r in zip(placed, reach, strict=True)) / cell)
-    east = math.ceil(max(p.x_m + r for (p, _), r in zip(placed, reach, strict=True)) / cell)
-    south = math.floor(min(p.y_m - r for (p, _), r in zip(placed, reach, strict=True)) / cell)
-    north = math.ceil(max(p.y_m + r for (p, _), r in zip(placed, reach, strict=True)) / cell)
-    total = np.zeros((north - south, east - west), dtype=np.float64)
-    hints = np.zeros_like(total)
-    for pose, evidence in placed:
-        add(total, hints, pose, evidence, cell, (south, west))
-    total = np.where(total >= 0.0, np.maximum(total, hints), total)
-    return trim(np.clip(total, CLAMP_FREE, CLAMP_OCCUPIED).astype(np.float32), (south, west), config)
+    return gather([cells_of(pose, evidence, config.cell_m) for pose, evidence in placed], config)
 
 
-def add(
-    total: NDArray[np.float64],
-    hints: NDArray[np.float64],
-    pose: Pose,
-    evidence: PolarEvidence,
-    cell_m: float,
-    corner: tuple[int, int],
-) -> None:
-    """Add one scan to a grid of log-odds in place: each cell looks up its own bearing and range."""
+def cells_of(pose: Pose, evidence: PolarEvidence, cell_m: float) -> Cells:
+    """Bring one scan into the map's cells: each cell's centre looks up its own bearing and range."""
     table = evidence.log_odds
     reach = table.shape[1] * evidence.range_step_m
-    south, west = corner
-    rows = slice(*_span(pose.y_m, reach, cell_m, south, total.shape[0]))
-    cols = slice(*_span(pose.x_m, reach, cell_m, west, total.shape[1]))
-    y = ((np.arange(rows.start, rows.stop) + south + 0.5) * cell_m - pose.y_m)[:, None]
-    x = ((np.arange(cols.start, cols.stop) + west + 0.5) * cell_m - pose.x_m)[None, :]
+    south, west = math.floor((pose.y_m - reach) / cell_m), math.floor((pose.x_m - reach) / cell_m)
+    rows = np.arange(south, math.ceil((pose.y_m + reach) / cell_m))
+    cols = np.arange(west, math.ceil((pose.x_m + reach) / cell_m))
+    y = ((rows + 0.5) * cell_m - pose.y_m)[:, None]
+    x = ((cols + 0.5) * cell_m - pose.x_m)[None, :]
     turn = np.arctan2(x, y) - pose.heading_rad
     bearing = np.floor(turn * (table.shape[0] / (2.0 * math.pi)) + 0.5).astype(np.intp) % table.shape[0]
     reached = (np.sqrt(x * x + y * y) / evidence.range_step_m).astype(np.intp)
-    within = reached < table.shape[1]
-    told = np.where(within, table[bearing, np.minimum(reached, table.shape[1] - 1)], 0.0)
-    hint = (told > 0.0) & (told <= HINT_LOG_ODDS)
-    total[rows, cols] += np.where(hint, 0.0, told)
-    np.maximum(hints[rows, cols], np.where(hint, told, 0.0), out=hints[rows, cols])
+    told = np.where(reached < table.shape[1], table[bearing, np.minimum(reached, table.shape[1] - 1)], 0.0)
+    row, col = np.nonzero(told)
+    return Cells(row + south, col + west, told[row, col].astype(np.float32))
 
 
-def _span(centre_m: float, reach_m: float, cell_m: float, first: int, size: int) -> tuple[int, int]:
-    low = math.floor((centre_m - reach_m) / cell_m) - first
-    high = math.ceil((centre_m + reach_m) / cell_m) - first
-    return max(low, 0), min(high, size)
+def gather(scans: Sequence[Cells], config: Map) -> Grid:
+    """Add up what scans say, in their order; hints do not add up, and where more is known they say nothing."""
+    told = [scan for scan in scans if len(scan.row)]
+    if not told:
+        return empty(config)
+    south, north = min(int(s.row.min()) for s in told), max(int(s.row.max()) for s in told)
+    west, east = min(int(s.col.min()) for s in told), max(int(s.col.max()) for s in told)
+    shape = (north - south + 1, east - west + 1)
+    total, hints = np.zeros(shape[0] * shape[1]), np.zeros(shape[0] * shape[1])
+    for scan in told:
+        cell = (scan.row - south) * shape[1] + (scan.col - west)
+        hint = (scan.log_odds > 0.0) & (scan.log_odds <= HINT_LOG_ODDS)
+        total[cell] += np.where(hint, 0.0, scan.log_odds)
+        hints[cell] = np.maximum(hints[cell], np.where(hint, scan.log_odds, 0.0))
+    log_odds = np.clip(np.where(total >= 0.0, np.maximum(total, hints), total), CLAMP_FREE, CLAMP_OCCUPIED)
+    return trim(np.pad(log_odds.reshape(shape).astype(np.float32), MARGIN_CELLS), (south, west), config)
 
 
 def trim(log_odds: NDArray[np.float32], corner: tuple[int, int], config: Map) -> Grid:
-    """Cut a grid to what it knows, and tell the state of each cell."""
+    """Cut a grid to what it knows and a margin, and tell the state of each cell.
+
+    ``corner`` is the cell at the south-west within the margin that the grid already has.
+    """
     known = log_odds != 0.0
     if not known.any():
         return empty(config)
     rows = np.flatnonzero(known.any(axis=1))
     cols = np.flatnonzero(known.any(axis=0))
-    south, north = max(rows[0] - MARGIN_CELLS, 0), rows[-1] + 1 + MARGIN_CELLS
-    west, east = max(cols[0] - MARGIN_CELLS, 0), cols[-1] + 1 + MARGIN_CELLS
-    kept = np.ascontiguousarray(log_odds[south:north, west:east])
-    x0_m, y0_m = (corner[1] + int(west)) * config.cell_m, (corner[0] + int(south)) * config.cell_m
+    south, west = int(rows[0]) - MARGIN_CELLS, int(cols[0]) - MARGIN_CELLS
+    kept = np.ascontiguousarray(log_odds[south : rows[-1] + 1 + MARGIN_CELLS, west : cols[-1] + 1 + MARGIN_CELLS])
+    x0_m, y0_m = (corner[1] + west - MARGIN_CELLS) * config.cell_m, (corner[0] + south - MARGIN_CELLS) * config.cell_m
     return Grid(config.cell_m, x0_m, y0_m, kept, states(kept, config))
 
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from config.schema import Map
 from mapping import grid as grids
-from mapping.beam import PolarEvidence, polar_evidence
+from mapping.beam import HINT_LOG_ODDS, PolarEvidence, of_face, polar_evidence, spread
 from mapping.values import FREE, OCCUPIED, UNKNOWN, Grid, Pose, Returns, Scan
 from tests.mapping.rooms import RECTANGLE, STEP_RAD, cast
 
@@ -98,3 +98,70 @@ def test_evidence_adds_up_and_is_held_within_bounds() -> None:
 def test_no_scans_give_no_cells() -> None:
     assert grids.render([], Map()).state.shape == (0, 0)
     assert grids.render([(Pose(0, 0, 0), evidence_of(RECTANGLE, silent=slice(0, 200)))], Map()).state.shape == (0, 0)
+
+
+def test_a_canvas_draws_to_the_byte_what_a_full_drawing_does():
+    rng = np.random.default_rng(4)
+    evidence = [evidence_of(RECTANGLE, sd_m=0.01 * (k + 1)) for k in range(6)]
+    placed = [(Pose(*rng.normal(0.0, 1.0, 3)), each) for each in evidence]
+    canvas = grids.Canvas(Map())
+    canvas.render(placed)
+    moved = [*placed[:2], (Pose(0.5, -0.2, 0.1), evidence[2]), *placed[3:5], (Pose(0.1, 0.1, 0.0), evidence[0])]
+    whole, again = grids.render(moved, Map()), canvas.render(moved)
+    assert (again.x0_m, again.y0_m) == (whole.x0_m, whole.y0_m)
+    assert again.log_odds.tobytes() == whole.log_odds.tobytes()
+    assert again.state.tobytes() == whole.state.tobytes()
+    assert canvas.render([]).state.shape == (0, 0)
+
+
+def test_only_scans_that_moved_are_worked_out_anew(monkeypatch: pytest.MonkeyPatch):
+    worked_out: list[Pose] = []
+    honest = grids.cells_of
+
+    def counted(pose: Pose, evidence: PolarEvidence, cell_m: float) -> grids.Cells:
+        worked_out.append(pose)
+        return honest(pose, evidence, cell_m)
+
+    monkeypatch.setattr(grids, "cells_of", counted)
+    placed = [(Pose(0.1 * k, 0.0, 0.0), evidence_of(RECTANGLE)) for k in range(4)]
+    canvas = grids.Canvas(Map())
+    canvas.render(placed)
+    canvas.render([*placed[:3], (Pose(2.0, 0.0, 0.0), placed[3][1])])
+    assert worked_out == [pose for pose, _ in placed] + [Pose(2.0, 0.0, 0.0)]
+
+
+def test_a_face_is_free_before_it_occupied_in_it_and_hardly_told_behind_it():
+    behind_m = np.array([-0.2, -0.06, 0.0, 0.01, 0.09, 0.3])
+    far_before, before, at, just_behind, behind, far_behind = of_face(behind_m, np.full(6, 0.015), 0.05)
+    assert far_before == pytest.approx(-0.9, abs=0.01)
+    assert before < 0.0
+    assert min(at, just_behind) > 1.1
+    assert 0.0 < behind <= HINT_LOG_ODDS
+    assert abs(far_behind) < 1e-6
+    assert of_face(np.zeros(1), np.full(1, 0.1), 0.05)[0] < at
+
+
+@given(scans=st.integers(1, 8), sd_m=st.floats(0.005, 0.03))
+@settings(max_examples=10, deadline=None)
+def test_walls_do_not_thicken_with_the_number_of_scans(scans: int, sd_m: float):
+    evidence = evidence_of(RECTANGLE, sd_m=sd_m)
+    grid = grids.render([(Pose(0.0, 0.0, 0.0), evidence)] * scans, Map())
+    walls = cells(grid, OCCUPIED)
+    assert off_walls(walls).max() < 0.08
+    assert len(walls) * 0.05 < 2.2 * 25.0
+
+
+def test_hints_do_not_add_up_to_a_wall():
+    vague = evidence_of(RECTANGLE, sd_m=0.2)
+    grid = grids.render([(Pose(0.0, 0.0, 0.0), vague)] * 20, Map())
+    assert len(cells(grid, OCCUPIED)) == 0
+    assert 0.4 < grid.log_odds.max() <= HINT_LOG_ODDS
+
+
+def test_water_between_vague_beams_is_open_no_further_than_they_say():
+    range_m = np.full(200, 3.0)
+    returns = Returns(range_m, np.where(np.arange(200) < 100, 0.02, 0.2), np.where(np.arange(200) < 100, 3.0, 1.0))
+    fan = spread(BEARING, returns, STEP_RAD, math.radians(3.0))
+    half = len(fan.free_m) // 2
+    assert fan.free_m[10 : half - 10].min() > 2.99
+    assert fan.free_m[half + 10 : -10].max() <= 1.0
