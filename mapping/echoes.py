@@ -32,7 +32,8 @@ ROUGH_M: Final = 0.12
 WIDE_M: Final = 0.35
 """A beam with more than this at the level of its peak, less 6 dB, has no clear place: a corner, or noise."""
 SHORT_M: Final = 0.3
-"""A wall of which less than this is seen without a break is no wall."""
+SHORT_RAD: Final = math.radians(45.0)
+"""A wall of which less than this is seen without a break, in length and in angle, is no wall."""
 PEAK_SD_M: Final = 0.012
 """Standard deviation of a wall met squarely ..."""
 SLANT_SD: Final = 0.6
@@ -185,7 +186,7 @@ def answers_m(beams: Beams, peaks: Peaks) -> Floats:
 
 
 def long_enough(sure: Flags, range_m: Floats, step_rad: float, *, closed: bool) -> Flags:
-    """Whether a beam is in a run of sure beams along which a wall of ``SHORT_M`` is seen, ``(n,)``."""
+    """Whether a beam is in a run of sure beams along which enough of a wall is seen, ``(n,)``."""
     n = len(sure)
     if sure.all():
         return sure
@@ -194,7 +195,7 @@ def long_enough(sure: Flags, range_m: Floats, step_rad: float, *, closed: bool) 
     run = np.cumsum(np.diff(turned, prepend=False) != 0)
     chord = np.hypot(length * step_rad, np.abs(np.diff(length, prepend=length[:1])) * np.roll(turned, 1))
     total = np.bincount(run, np.where(turned, np.minimum(chord, 2.0 * ROUGH_M), 0.0), minlength=n + 1)
-    return np.roll(turned & (total[run] >= SHORT_M), start)
+    return np.roll(turned & (total[run] >= np.minimum(SHORT_M, SHORT_RAD * length)), start)
 
 
 def quiet_water(beams: Beams, peaks: Peaks) -> Floats:

@@ -24,6 +24,8 @@ ROBUST: Final = 2.0
 ONE_SIDED: Final = 2.0
 """A window on one side is taken where its mean square residual is smaller than the whole one's by this factor."""
 FEWEST: Final = 3
+LEAST_SPARE: Final = 0.3
+"""Residuals are over the points that two unknowns leave, at least this: three points always fit well."""
 ALONG_SHARE: Final = 0.5
 """Part of a beam's error that its neighbours share: speckle and overlapping beams."""
 
@@ -90,7 +92,8 @@ def _fit(sine: Floats, cosine: Floats, z: Floats, sd: Floats, near: Floats) -> t
         robust = 1.0 / (1.0 + (off / ROBUST) ** 2)
     used = near > 0.0
     with np.errstate(divide="ignore", invalid="ignore"):
-        square = (near * robust * off**2).sum(axis=1) / (near * robust).sum(axis=1)
+        spare = np.maximum((near * robust).sum(axis=1) - 2.0, LEAST_SPARE)
+        square = (near * robust * off**2).sum(axis=1) / spare
         own = np.sqrt(ss / det) / b**2
     enough = (used.sum(axis=1) >= FEWEST) & (det > 0.0)
     shared = ALONG_SHARE * np.where(used, sd, np.inf).min(axis=1)

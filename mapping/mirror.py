@@ -19,12 +19,12 @@ Flags = NDArray[np.bool_]
 
 BEHIND_M: Final = 0.3
 """A return farther than this behind a wall's line is not of that wall."""
-IMAGE_M: Final = 0.12
+IMAGE_M: Final = 0.15
 """An image lies within this of what it is an image of."""
 ECHO_M: Final = 0.1
-HEARD: Final = 12.0
+HEARD: Final = 25.0
 """Counts above the floor of the mirror's own echo, within ``ECHO_M`` of its line."""
-BESIDE_RAD: Final = math.radians(60.0)
+BESIDE_RAD: Final = math.radians(90.0)
 """The mirror was seen within this of the beam ..."""
 VOTES: Final = 3
 """... by so many beams."""

@@ -11,12 +11,14 @@ from pathlib import Path
 from typing import Final
 
 from config.errors import UsageError
-from tools.bench import acquisition, holes, holes_maps, holes_paper, holes_table, tank, truth
+from config.schema import Map
+from tools.bench import acquisition, beams, holes, holes_maps, holes_paper, holes_table, stations, tank, truth
+from tools.emulator.site import SITES
 
 Row = dict[str, str | int | float]
 
-_BENCHES: Final = ("tank", "truth", "acquisition", "holes")
-_ON_DATA: Final = ("tank", "holes")
+_BENCHES: Final = ("tank", "truth", "stations", "acquisition", "holes")
+_ON_DATA: Final = ("tank", "stations", "holes")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,6 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("benches", nargs="*", metavar="BENCH", help=f"which of {', '.join(_BENCHES)} (default: all)")
     parser.add_argument("--data", type=Path, default=Path("../shared/data"), metavar="DIR", help="real recordings")
     parser.add_argument("--seeds", type=int, default=2, metavar="N", help="emulated dives per site (default: 2)")
+    parser.add_argument("--sites", default="keyhole", metavar="LIST", help="truth: emulated sites (default: keyhole)")
     parser.add_argument("--quick", action="store_true", help="acquisition: a short run, for a first look")
     parser.add_argument("--half", choices=("tune", "report"), default="report", help="holes: maps to measure on")
     parser.add_argument("--maps", type=int, default=4, metavar="K", help="holes: damaged pieces per map (default: 4)")
@@ -38,6 +41,8 @@ def run(args: argparse.Namespace) -> int:
     broken: list[str] = []
     if wrong := set(args.benches) - set(_BENCHES):
         raise UsageError(f"there is no bench {', '.join(sorted(wrong))}; choose of {', '.join(_BENCHES)}")
+    if unknown := set(args.sites.split(",")) - set(SITES):
+        raise UsageError(f"there is no site {', '.join(sorted(unknown))}; choose of {', '.join(sorted(SITES))}")
     for name in args.benches or _BENCHES:
         if name in _ON_DATA and not args.benches and not args.data.is_dir():
             print(f"{name}: left out, no recordings in {args.data} (name their folder with --data)")
@@ -54,6 +59,7 @@ def _measure(name: str, args: argparse.Namespace) -> Iterator[Row]:
     measures: dict[str, Callable[[argparse.Namespace], Iterator[Row]]] = {
         "tank": _tank,
         "truth": _truth,
+        "stations": _stations,
         "acquisition": _acquisition,
         "holes": _holes,
     }
@@ -63,11 +69,19 @@ def _measure(name: str, args: argparse.Namespace) -> Iterator[Row]:
 def _tank(args: argparse.Namespace) -> Iterator[Row]:
     for circles in (1, 14):
         yield asdict(tank.measure(args.data, circles))
+    scans = beams.tank_scans(args.data / "sonar" / "micron-tank-14scans.npz", 14)
+    yield asdict(beams.judge_beams(scans, Map()))
 
 
 def _truth(args: argparse.Namespace) -> Iterator[Row]:
     for seed in range(1, args.seeds + 1):
-        yield asdict(truth.measure("keyhole", seed))
+        for site in args.sites.split(","):
+            yield asdict(truth.measure(site, seed))
+
+
+def _stations(args: argparse.Namespace) -> Iterator[Row]:
+    for figures in stations.measure(args.data):
+        yield asdict(figures)
 
 
 def _acquisition(args: argparse.Namespace) -> Iterator[Row]:

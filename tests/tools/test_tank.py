@@ -1,13 +1,22 @@
-"""A real tank, from a serial capture to the map: one rectangular room, and neither ringing nor ghosts."""
+"""A real tank from capture to map, and emulated ones: one rectangular room, and neither ringing nor ghosts."""
 
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from config.errors import DataError, InputError
+from config.schema import Map
+from mapping.echoes import VAGUE_SD_M, pick
+from mapping.values import Scan
+from tools.bench.beams import fit_room, judge_beams, tank_scans
 from tools.bench.tank import judge_tank, map_tank
+from tools.emulator.echoes import EchoModel, Place, Sampling
+from tools.emulator.site import TILE, Site, Stop, Wall, rectangle
 
 
 @pytest.mark.parametrize("circles", [1, 14])
@@ -15,8 +24,60 @@ def test_the_real_tank_is_one_rectangular_room(shared_data: Path, tmp_path: Path
     grid = map_tank(shared_data / "sonar" / "micron-tank-14scans.npz", tmp_path, circles)
     figures = judge_tank(grid, circles)
     assert sorted((figures.side_a_m, figures.side_b_m)) == pytest.approx([4.4, 4.6], abs=0.1)
-    assert figures.share_near_walls > 0.85
-    assert figures.share_outside < 0.03
+    assert figures.occupied_cells > 200
+    assert figures.share_near_walls > 0.97
+    assert figures.share_inside < 0.02
+    assert figures.share_outside < 0.01
     report = json.loads((tmp_path / "map" / "report.json").read_text())
     assert report["stations"] == {"placed": 1}
     assert (tmp_path / "map" / "plan.png").stat().st_size > 10_000
+
+
+def test_most_beams_find_the_real_tank_and_those_that_are_sure_are_right(shared_data: Path) -> None:
+    figures = judge_beams(tank_scans(shared_data / "sonar" / "micron-tank-14scans.npz", 14), Map())
+    assert figures.circles == 14
+    assert figures.all_near_walls > 0.82
+    assert figures.sure > 0.65
+    assert figures.sure_near_walls > 0.97
+
+
+def test_what_is_no_recording_of_a_tank_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="cannot read"):
+        tank_scans(tmp_path / "none.npz", 1)
+    np.savez(tmp_path / "other.npz", a=np.zeros(3))
+    with pytest.raises(DataError, match="not a recording"):
+        tank_scans(tmp_path / "other.npz", 1)
+    silent = Scan(0, 0, 1, 0.0, math.nan, np.arange(200) * 0.0314, np.zeros((200, 400), np.uint8), 0.02, 0.0314, "full")
+    with pytest.raises(DataError, match="0 sure beams"):
+        judge_beams([silent], Map())
+
+
+def beside_a_wall(width_m: float, length_m: float, x_m: float, seed: int) -> tuple[Scan, np.ndarray]:
+    """Circle of a head 17 cm from a tank's wall, ringing to 0.7 m, and the true range of each beam."""
+    walls = (Wall(np.array(rectangle(0.0, 0.0, width_m, length_m))),)
+    model = EchoModel(Site("tank", walls, floor_m=1.4, stops=(Stop(1, 1, 0.7, 0),), material=TILE), seed)
+    bearing = np.arange(200) * math.radians(1.8)
+    pings = [model.ping(Place(x_m, 0.17, 0.7, 0.0), float(b), Sampling(0.025, 400), i) for i, b in enumerate(bearing)]
+    bins_m = (np.arange(400) + 0.5) * 0.025
+    ringing_db = np.interp(bins_m, (0.05, 0.06, 0.1, 0.2, 0.5, 0.6, 0.7, 0.8), (-40, 20, 33, 34, 30, 24, 20, -40))
+    echoes = np.maximum(np.stack(pings), np.clip(ringing_db * 255.0 / 80.0, 0, 255)).astype(np.uint8)
+    scan = Scan(0, 0, 1, 0.0, 0.7, bearing, echoes, 0.025, math.radians(1.8), "full")
+    with np.errstate(divide="ignore"):
+        to_side = np.where(np.sin(bearing) > 0, width_m - x_m, -x_m) / np.sin(bearing)
+        to_end = np.where(np.cos(bearing) > 0, length_m - 0.17, -0.17) / np.cos(bearing)
+    return scan, np.minimum(to_side, to_end)
+
+
+@pytest.mark.parametrize(("width_m", "length_m", "x_m"), [(4.6, 4.4, 1.9), (3.0, 3.6, 1.2), (2.4, 6.0, 1.5)])
+def test_a_wall_in_the_ringing_is_seen_and_not_the_room_behind_it(width_m: float, length_m: float, x_m: float) -> None:
+    scan, truth_m = beside_a_wall(width_m, length_m, x_m, seed=1)
+    returns = pick(scan, Map())
+    sure = returns.sd_m < VAGUE_SD_M
+    assert sure.mean() > 0.6
+    assert np.mean(np.abs(returns.range_m - truth_m)[sure] < 0.1) > 0.93
+    assert np.mean(returns.free_m > truth_m + 0.15) < 0.05
+    near = truth_m < 0.3
+    assert sure[near].mean() > 0.5
+    room = fit_room(scan.bearing_rad[sure], returns.range_m[sure])
+    assert room is not None
+    assert sorted(room.sides_m) == pytest.approx(sorted((width_m, length_m)), abs=0.06)

@@ -1,0 +1,160 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mapping.between import Seen, expected_m, faint_behind, peak_near, sides, veils
+from mapping.clutter import deaf_m, lobe_weights, smoothed, without_ringing
+from mapping.lines import fit_walls
+from mapping.mirror import Heard, images
+from mapping.peaks import CENTRE_M, TAIL_M, centre_m, longer_m
+from tests.mapping.rooms import RECTANGLE, STEP_RAD, cast
+
+BIN_M = 0.02
+BEARING = np.arange(200) * STEP_RAD
+TRUE_M = np.array([cast(RECTANGLE, 0.0, 0.0, float(b))[0] for b in BEARING])
+
+
+def fitted(range_m: np.ndarray, sd_m: float = 0.03):
+    return fit_walls(BEARING, range_m, np.full(200, sd_m), STEP_RAD, closed=True)
+
+
+@given(seed=st.integers(0, 1000))
+@settings(max_examples=10, deadline=None)
+def test_neighbours_together_know_their_wall_better_than_each_alone(seed: int):
+    noise_m = np.random.default_rng(seed).normal(0.0, 0.03, 200)
+    fit = fitted(TRUE_M + noise_m)
+    along = TRUE_M < 3.2
+    assert np.std((fit.range_m - TRUE_M)[along]) < 0.85 * np.std(noise_m[along])
+    assert np.mean(np.abs(fit.range_m - TRUE_M) < 3.0 * fit.sd_m) > 0.9
+
+
+def test_a_straight_wall_stays_straight_up_to_its_corner():
+    fit = fitted(TRUE_M)
+    assert np.isfinite(fit.range_m).mean() > 0.95
+    assert np.nanmax(np.abs(fit.range_m - TRUE_M)) < 0.035
+    south = np.abs(BEARING - math.pi) < math.radians(20.0)
+    assert 1.0 / np.hypot(*fit.wall[south].T) == pytest.approx(3.0, abs=1e-6)
+
+
+def test_silent_beams_have_no_wall_and_spoil_none():
+    range_m = np.where(np.arange(200) % 3 == 0, np.nan, TRUE_M)
+    fit = fitted(range_m)
+    assert np.isnan(fit.range_m[::3]).all()
+    known = np.isfinite(fit.range_m)
+    assert known.sum() > 100
+    assert np.abs(fit.range_m - TRUE_M)[known].max() < 0.05
+    assert np.isnan(fitted(np.full(200, np.nan)).range_m).all()
+
+
+def test_the_line_of_the_walls_beside_a_silent_beam_is_expected_there():
+    sure = np.ones(200, dtype=bool)
+    sure[60:70] = False
+    expected = expected_m(BEARING, fitted(TRUE_M).wall, sure, STEP_RAD, closed=True)
+    assert expected[60:70] == pytest.approx(TRUE_M[60:70], abs=0.05)
+    assert np.isnan(expected_m(BEARING, np.full((200, 2), np.nan), ~sure & False, STEP_RAD, closed=True)).all()
+
+
+def test_sides_of_a_sector_do_not_reach_over_its_ends():
+    sure = np.array([False, True, False, False, True, False])
+    before, after = sides(sure, 2, closed=False)
+    np.testing.assert_array_equal(before, [-1, 1, 1, 1, 4, 4])
+    np.testing.assert_array_equal(after, [1, 1, 4, 4, 4, -1])
+    np.testing.assert_array_equal(sides(sure, 2, closed=True)[0], [4, 1, 1, 1, 4, 4])
+
+
+def test_a_faint_glimpse_behind_the_walls_is_none_and_a_clear_one_is():
+    range_m, level = TRUE_M.copy(), np.full(200, 100.0)
+    range_m[98:103] += 2.0
+    sure, wall = np.ones(200, dtype=bool), fitted(TRUE_M).wall
+    clear = faint_behind(Seen(BEARING, range_m, level), sure, wall, STEP_RAD, closed=True)
+    assert not clear.any()
+    level[98:103] = 40.0
+    faint = faint_behind(Seen(BEARING, range_m, level), sure, wall, STEP_RAD, closed=True)
+    np.testing.assert_array_equal(np.flatnonzero(faint), np.arange(98, 103))
+
+
+def room_echoes(level: float = 100.0) -> np.ndarray:
+    echoes = np.zeros((200, 500))
+    echoes[np.arange(200), (TRUE_M / BIN_M).astype(int)] = level
+    return echoes
+
+
+def test_what_stands_before_a_wall_without_hiding_it_is_passed():
+    echoes = room_echoes()
+    echoes[98:102, 60] = 90.0
+    bins = echoes.argmax(axis=1)
+    bins[98:102] = 60
+    weights = veils(echoes, bins, BIN_M, STEP_RAD)
+    assert (weights[98:102, 60] == 0.0).all()
+    assert (weights[98:102, bins[97] - 5 :] == 1.0).all()
+    assert (weights[:98] == 1.0).all()
+    echoes[98:102, 70:] = 0.0  # a body throws a shadow
+    assert (veils(echoes, bins, BIN_M, STEP_RAD) == 1.0).all()
+
+
+def test_a_mirror_image_of_the_room_is_none():
+    fit = fitted(TRUE_M)
+    range_m = TRUE_M.copy()
+    ghost = slice(108, 116)  # seen past the south wall: the west wall's image, which goes straight on
+    range_m[ghost] = -2.0 / np.sin(BEARING[ghost])
+    echoes = room_echoes()
+    told = images(BEARING, range_m, fit.wall, np.ones(200, dtype=bool), Heard(echoes, BIN_M, 0.0))
+    np.testing.assert_array_equal(np.flatnonzero(told), np.arange(108, 116))
+    silent = np.zeros_like(echoes)
+    assert not images(BEARING, range_m, fit.wall, np.ones(200, dtype=bool), Heard(silent, BIN_M, 0.0)).any()
+    hidden = images(BEARING, range_m, fit.wall, np.ones(200, dtype=bool), Heard(silent, BIN_M, 9.0))
+    assert hidden[ghost].all()
+    assert not images(BEARING, range_m, fit.wall, np.zeros(200, dtype=bool), Heard(echoes, BIN_M, 0.0)).any()
+
+
+def test_a_wall_within_the_ringing_stands_out_of_it():
+    rng = np.random.default_rng(1)
+    echoes = np.clip(rng.normal(20.0, 5.0, (200, 400)), 0, 255)
+    echoes[:, :30] = 100.0 + rng.normal(0.0, 3.0, (200, 30))
+    echoes[:80, 9:11] = 165.0  # 0.2 m away, nearer than the least range, over two fifths of the circle
+    clear = without_ringing(echoes, BIN_M, 0.3)
+    assert clear[:80, 9:11].min() > 150.0
+    assert clear[80:, :28].max() == 0.0
+    assert deaf_m(echoes, BIN_M) == pytest.approx(0.6)
+    assert smoothed(clear, BIN_M)[:80, 9:11].min() > 120.0
+
+
+def test_the_side_lobe_of_a_clear_wall_counts_less_and_the_wall_itself_in_full():
+    smooth = np.full((200, 300), 20.0)
+    smooth[50, 100] = 150.0
+    smooth[[44, 56], 100] = 90.0
+    smooth[[44, 56], 200] = 90.0
+    weights = lobe_weights(smooth, STEP_RAD, closed=True)
+    assert weights[44, 100] == weights[56, 100] == 0.5
+    assert weights[50, 100] == weights[44, 200] == weights[56, 200] == 1.0
+    assert lobe_weights(smooth[:60], STEP_RAD, closed=False).shape == (60, 300)
+
+
+@given(range_m=st.floats(0.5, 7.0))
+@settings(max_examples=25, deadline=None)
+def test_the_centre_of_an_echo_is_where_its_power_is(range_m: float):
+    bins_m = (np.arange(450) + 0.5) * BIN_M
+    level = np.maximum(120.0 - 0.5 * 32.0 / 10.0 * ((bins_m - range_m) / 0.02) ** 2, 0.0)[None, :]
+    centre = centre_m(level, np.zeros(450), level.argmax(axis=1), BIN_M)
+    assert centre[0] == pytest.approx(range_m, abs=0.002)
+
+
+def test_echoes_read_long_by_the_beams_height_but_no_more_than_the_window_takes_in():
+    longer = longer_m(np.array([0.5, 2.0, 5.0, 50.0]), math.radians(17.5))
+    assert (np.diff(longer) > 0.0).all()
+    assert longer[0] - TAIL_M == pytest.approx(0.004, abs=0.002)
+    assert longer[-1] < TAIL_M + CENTRE_M / 3.0
+    assert longer_m(np.array([3.0]), 1e-3)[0] == pytest.approx(TAIL_M, abs=1e-4)
+
+
+def test_the_peak_nearest_to_an_expected_place_is_taken():
+    excess = np.zeros((3, 300))
+    excess[0, [100, 106]] = 50.0
+    excess[1, 140] = 50.0
+    at = peak_near(excess, np.array([2.01, 2.0, np.nan]), BIN_M)
+    np.testing.assert_array_equal(at, [100, -1, -1])
