@@ -14,6 +14,7 @@ COMMANDS: Final[dict[str, tuple[str, str]]] = {
     "run": ("tools.run", "the daemon: record, map, publish"),
     "demo": ("tools.demo", "an emulated dive, the real daemon on it, and the live page"),
     "replay": ("tools.replay", "map recorded logs as if they were live"),
+    "calibrate": ("tools.calibrate", "speed of sound and range offset from a pool of known size"),
     "fill": ("tools.fill_map", "fill the holes of a ROS map_server map"),
     "import": ("tools.import_log", "a foreign recording as a log"),
     "info": ("tools.info", "what is in a log"),
