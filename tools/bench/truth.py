@@ -24,6 +24,9 @@ from tools.emulator.vehicle import Rest
 WITHIN_CELLS: Final = 1.5
 """A wall cell is right if its centre is no farther from true wall than the cell next to the wall's own is."""
 
+WRONG_M: Final = 0.5
+"""A placed station farther than this from where it was is wrong, and confident."""
+
 
 @dataclass(frozen=True, slots=True)
 class TruthFigures:
@@ -38,7 +41,10 @@ class TruthFigures:
     placed: int
     unplaced: int
     stray: int
+    pieces: int
+    wrong: int
     error_median_m: float
+    error_95_m: float
     error_max_m: float
     heading_max_deg: float
     wall_precision: float
@@ -83,7 +89,10 @@ def judge(dive: Dive, state: MapState, config: Config) -> TruthFigures:
         placed=len({rest.index for _, rest in pairs}),
         unplaced=sum(station.status != "placed" for station in state.stations),
         stray=len(placed) - len(pairs),
+        pieces=len({station.piece for station in state.stations}),
+        wrong=int((errors_m > WRONG_M).sum()),
         error_median_m=round(float(np.median(errors_m)), 4),
+        error_95_m=round(float(np.percentile(errors_m, 95)), 4),
         error_max_m=round(float(np.max(errors_m)), 4),
         heading_max_deg=round(float(np.degrees(max(headings_rad))), 3),
         wall_precision=round(precision, 4),

@@ -1,0 +1,21 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from config.errors import UsageError
+from tools.bench.stations import pairs, read
+
+
+def test_pairs_of_a_real_log_are_near_and_none_is_confidently_wrong(shared_data: Path) -> None:
+    figures = pairs(shared_data / "stations", "intel")
+    assert figures.pairs == 47
+    assert figures.near > 0.85
+    assert figures.accepted > 0.5
+    assert figures.accepted_wrong == 0
+
+
+def test_a_log_that_is_not_there_is_told(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="--data"):
+        read(tmp_path / "none.npz")

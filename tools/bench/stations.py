@@ -1,0 +1,174 @@
+"""Stations without odometry, on real laser logs made sonar-like: pairs of scans, and whole logs with and without hints.
+
+The files of ``data/stations`` hold scans of 200 beams, a noisy compass and reference poses, which serve for scoring
+only.  Their angles turn counter-clockwise from east.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import degrees, pi, radians
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.errors import UsageError
+from config.schema import Map
+from mapping.prior import Hint, Prior
+from mapping.register import register
+from mapping.sight import Sight, sight_of
+from mapping.stations import Stations
+from mapping.values import Returns, Scan
+from mapping.verdict import judge
+from tools.bench.align import align, angle_between
+
+LOGS: Final = ("intel", "freiburg-079", "fhw")
+REACH_M: Final = 3.0
+NEAR_M, NEAR_DEG, WRONG_M = 0.15, 3.0, 0.5
+IN_95: Final = 5.99
+HINT_M: Final = 0.5
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class PairFigures:
+    """Pairs of consecutive stations; shares of all pairs, but ``covered`` (by 95 % ellipses) of the accepted ones."""
+
+    log: str
+    pairs: int
+    near: float
+    near_to_2_m: float
+    accepted: float
+    accepted_wrong: int
+    covered: float
+
+
+@dataclass(frozen=True, slots=True)
+class LogFigures:
+    """A whole log, scan after scan; errors after the best rigid alignment of the placed stations."""
+
+    log: str
+    hints: str
+    stations: int
+    placed: int
+    pieces: int
+    wrong: int
+    error_median_m: float
+    error_95_m: float
+    covered: float
+
+
+@dataclass(frozen=True, slots=True)
+class Laser:
+    """A log: sights, true places ``(n, 2)`` in m, true headings and compass ``(n,)`` clockwise from north."""
+
+    sights: list[Sight]
+    true_m: Floats
+    heading_rad: Floats
+    chain: NDArray[np.int64]
+
+
+def read(path: Path) -> Laser:
+    """Read a log; raises UsageError where there is none."""
+    if not path.is_file():
+        raise UsageError(f"no stations in {path}; name the folder of recordings with --data")
+    log = np.load(path)
+    headings, compass = (pi / 2.0 - angle.astype(np.float64) for angle in (log["ref"][:, 2], log["compass"]))
+    bearing = -log["bearing"].astype(np.float64)
+    sights = [
+        _sight(k, ranges.astype(np.float64), bearing, float(compass[k])) for k, ranges in enumerate(log["ranges360"])
+    ]
+    return Laser(sights, log["ref"][:, :2].astype(np.float64), headings, log["chain"].astype(np.int64))
+
+
+def _sight(index: int, range_m: Floats, bearing_rad: Floats, heading_rad: float) -> Sight:
+    seen = np.isfinite(range_m)
+    returns = Returns(range_m, np.where(seen, 0.04, np.nan), np.where(seen, range_m, 0.0))
+    echoes = np.zeros((len(range_m), 1), np.uint8)
+    scan = Scan(index, index, index, heading_rad, float("nan"), bearing_rad, echoes, 0.02, radians(1.8), "full")
+    return sight_of(scan, returns, Map())
+
+
+def pairs(folder: Path, name: str) -> PairFigures:
+    """Register each scan in the one before it, where both are within reach."""
+    log = read(folder / f"{name}.npz")
+    steps_m = np.hypot(*np.diff(log.true_m, axis=0).T)
+    within = np.flatnonzero((np.diff(log.chain) == 0) & (steps_m <= REACH_M))
+    rows = [(float(steps_m[i]), *_pair(log, int(i))) for i in within]
+    step, off, turn_deg, accepted, covered = (np.array(column) for column in zip(*rows, strict=True))
+    near = (off <= NEAR_M) & (turn_deg <= NEAR_DEG)
+    return PairFigures(
+        log=name,
+        pairs=len(rows),
+        near=round(float(near.mean()), 3),
+        near_to_2_m=round(float(near[step <= 2.0].mean()), 3),
+        accepted=round(float(accepted.mean()), 3),
+        accepted_wrong=int((off[accepted] > WRONG_M).sum()),
+        covered=round(float(covered[accepted].mean()), 3),
+    )
+
+
+def _pair(log: Laser, i: int) -> tuple[float, float, bool, bool]:
+    """Register a station in the one before: errors in m and degrees, whether it is accepted, and covered."""
+    config, one, other = Map(), log.sights[i], log.sights[i + 1]
+    turn_rad = other.scan.heading_rad - one.scan.heading_rad
+    prior = Prior(0.0, 0.0, REACH_M, turn_rad, radians(config.compass_sd_deg))
+    match = register(other.view, one.view, prior, config.particles, np.random.default_rng([config.seed, i]))
+    off_m = np.array([match.pose.x_m, match.pose.y_m]) - _in_axes(log, i)
+    turned = float(log.heading_rad[i + 1] - log.heading_rad[i])
+    off_deg = degrees(abs(angle_between(match.pose.heading_rad, turned)))
+    accepted = judge(other.scan, match, 0, prior, chained=True).status == "placed"
+    return float(np.hypot(*off_m)), off_deg, accepted, _covered(match.covariance, off_m)
+
+
+def _in_axes(log: Laser, i: int) -> Floats:
+    """Where the next station is, in the axes of station ``i``: x right, y ahead."""
+    (dx, dy), h = log.true_m[i + 1] - log.true_m[i], log.heading_rad[i]
+    return np.array([np.cos(h) * dx - np.sin(h) * dy, np.sin(h) * dx + np.cos(h) * dy])
+
+
+def whole(folder: Path, name: str, *, hinted: bool) -> LogFigures:
+    """Place all scans of a log; with hints that are wrong by up to ``HINT_M`` east and north at each step."""
+    log, stations = read(folder / f"{name}.npz"), Stations(Map())
+    rng = np.random.default_rng(1)
+    for i, sight in enumerate(log.sights):
+        hint = None
+        if hinted and i:
+            dx, dy = log.true_m[i] - log.true_m[i - 1] + rng.uniform(-HINT_M, HINT_M, 2)
+            hint = Hint(float(dx), float(dy), HINT_M)
+        stations.add(sight, hint)
+    placed = [k for k, station in enumerate(stations.all) if station.status == "placed"]
+    found_m = np.array([[stations.all[k].pose.x_m, stations.all[k].pose.y_m] for k in placed])
+    turns = [angle_between(stations.all[k].pose.heading_rad, float(log.heading_rad[k])) for k in placed]
+    fit = align(found_m, log.true_m[placed], float(np.median(turns)))
+    off_m = fit.apply(found_m) - log.true_m[placed]
+    error_m = np.hypot(off_m[:, 0], off_m[:, 1])
+    inside = [_covered(stations.all[k].covariance, off) for k, off in zip(placed[1:], off_m[1:], strict=True)]
+    return LogFigures(
+        log=name,
+        hints="+-0.5 m" if hinted else "none",
+        stations=len(log.sights),
+        placed=len(placed),
+        pieces=len({station.piece for station in stations.all}),
+        wrong=int((error_m > WRONG_M).sum()),
+        error_median_m=round(float(np.median(error_m)), 3),
+        error_95_m=round(float(np.percentile(error_m, 95)), 3),
+        covered=round(float(np.mean(inside)), 3) if inside else 0.0,
+    )
+
+
+def _covered(covariance: Floats, off_m: Floats) -> bool:
+    return bool(off_m @ np.linalg.solve(covariance[:2, :2], off_m) <= IN_95)
+
+
+def measure(folder: Path) -> Iterator[PairFigures | LogFigures]:
+    """Yield the figures of all logs."""
+    for name in LOGS:
+        yield pairs(folder / "stations", name)
+    for name in LOGS:
+        for hinted in (False, True):
+            yield whole(folder / "stations", name, hinted=hinted)
