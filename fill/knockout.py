@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
+from fill.freedom import at
 from fill.segments import EIGHT, STEPS, End, Walls
 from mapping.values import FREE, OCCUPIED, UNKNOWN
 
@@ -160,9 +161,8 @@ def _facing_pairs(ends: tuple[End, ...], longest: float) -> list[tuple[int, int]
 
 def _open_between(a: End, b: End, gap: float, state: NDArray[np.uint8]) -> bool:
     share = np.linspace(0.2, 0.8, int(2 * gap) + 2)
-    row = np.rint(a.y + (b.y - a.y) * share).astype(np.int64)
-    col = np.rint(a.x + (b.x - a.x) * share).astype(np.int64)
-    return bool(np.mean(state[row, col] == FREE) > 0.8)
+    between = at(state, a.x + (b.x - a.x) * share, a.y + (b.y - a.y) * share)
+    return bool(np.mean(between == FREE) > 0.8)
 
 
 def _blank_opening(

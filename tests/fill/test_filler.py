@@ -192,3 +192,16 @@ def test_nothing_measured_is_touched_and_holes_are_whole(fill: Fills, noise: Sta
         layer = filled.hole == hole.index
         assert ndimage.label(layer, np.ones((3, 3)))[1] == 1
         assert int(layer.sum()) == len(hole.cells)
+
+
+def test_walls_that_run_out_of_the_grid_are_filled_like_others(fill: Fills) -> None:
+    for seed in range(25):
+        random = np.random.default_rng(seed)
+        height, width = random.integers(20, 90, 2)
+        rough = ndimage.gaussian_filter(random.normal(size=(height, width)), random.uniform(1.0, 5.0))
+        state = np.full(rough.shape, FREE, np.uint8)
+        state[np.abs(rough - np.median(rough)) < rough.std() * random.uniform(0.1, 0.4)] = OCCUPIED
+        unseen = ndimage.gaussian_filter(random.normal(size=rough.shape), 4.0) > random.uniform(0.0, 0.1)
+        state[unseen] = UNKNOWN
+        filled = fill(state)
+        assert not np.any((filled.hole >= 0) & (state != UNKNOWN))

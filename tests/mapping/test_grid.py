@@ -100,7 +100,7 @@ def test_no_scans_give_no_cells() -> None:
     assert grids.render([(Pose(0, 0, 0), evidence_of(RECTANGLE, silent=slice(0, 200)))], Map()).state.shape == (0, 0)
 
 
-def test_a_canvas_draws_to_the_byte_what_a_full_drawing_does():
+def test_a_canvas_draws_to_the_byte_what_a_full_drawing_does() -> None:
     rng = np.random.default_rng(4)
     evidence = [evidence_of(RECTANGLE, sd_m=0.01 * (k + 1)) for k in range(6)]
     placed = [(Pose(*rng.normal(0.0, 1.0, 3)), each) for each in evidence]
@@ -114,7 +114,7 @@ def test_a_canvas_draws_to_the_byte_what_a_full_drawing_does():
     assert canvas.render([]).state.shape == (0, 0)
 
 
-def test_only_scans_that_moved_are_worked_out_anew(monkeypatch: pytest.MonkeyPatch):
+def test_only_scans_that_moved_are_worked_out_anew(monkeypatch: pytest.MonkeyPatch) -> None:
     worked_out: list[Pose] = []
     honest = grids.cells_of
 
@@ -130,7 +130,7 @@ def test_only_scans_that_moved_are_worked_out_anew(monkeypatch: pytest.MonkeyPat
     assert worked_out == [pose for pose, _ in placed] + [Pose(2.0, 0.0, 0.0)]
 
 
-def test_a_face_is_free_before_it_occupied_in_it_and_hardly_told_behind_it():
+def test_a_face_is_free_before_it_occupied_in_it_and_hardly_told_behind_it() -> None:
     behind_m = np.array([-0.2, -0.06, 0.0, 0.01, 0.09, 0.3])
     far_before, before, at, just_behind, behind, far_behind = of_face(behind_m, np.full(6, 0.015), 0.05)
     assert far_before == pytest.approx(-0.9, abs=0.01)
@@ -143,7 +143,7 @@ def test_a_face_is_free_before_it_occupied_in_it_and_hardly_told_behind_it():
 
 @given(scans=st.integers(1, 8), sd_m=st.floats(0.005, 0.03))
 @settings(max_examples=10, deadline=None)
-def test_walls_do_not_thicken_with_the_number_of_scans(scans: int, sd_m: float):
+def test_walls_do_not_thicken_with_the_number_of_scans(scans: int, sd_m: float) -> None:
     evidence = evidence_of(RECTANGLE, sd_m=sd_m)
     grid = grids.render([(Pose(0.0, 0.0, 0.0), evidence)] * scans, Map())
     walls = cells(grid, OCCUPIED)
@@ -151,14 +151,14 @@ def test_walls_do_not_thicken_with_the_number_of_scans(scans: int, sd_m: float):
     assert len(walls) * 0.05 < 2.2 * 25.0
 
 
-def test_hints_do_not_add_up_to_a_wall():
+def test_hints_do_not_add_up_to_a_wall() -> None:
     vague = evidence_of(RECTANGLE, sd_m=0.2)
     grid = grids.render([(Pose(0.0, 0.0, 0.0), vague)] * 20, Map())
     assert len(cells(grid, OCCUPIED)) == 0
     assert 0.4 < grid.log_odds.max() <= HINT_LOG_ODDS
 
 
-def test_water_between_vague_beams_is_open_no_further_than_they_say():
+def test_water_between_vague_beams_is_open_no_further_than_they_say() -> None:
     range_m = np.full(200, 3.0)
     returns = Returns(range_m, np.where(np.arange(200) < 100, 0.02, 0.2), np.where(np.arange(200) < 100, 3.0, 1.0))
     fan = spread(BEARING, returns, STEP_RAD, math.radians(3.0))

@@ -6,26 +6,27 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from mapping.between import Seen, expected_m, faint_behind, peak_near, sides, veils
 from mapping.clutter import deaf_m, lobe_weights, smoothed, without_ringing
-from mapping.lines import fit_walls
+from mapping.lines import Fit, fit_walls
 from mapping.mirror import Heard, images
 from mapping.peaks import CENTRE_M, TAIL_M, centre_m, longer_m
 from tests.mapping.rooms import RECTANGLE, STEP_RAD, cast
 
 BIN_M = 0.02
-BEARING = np.arange(200) * STEP_RAD
+BEARING = np.arange(200.0, dtype=np.float64) * np.float64(STEP_RAD)
 TRUE_M = np.array([cast(RECTANGLE, 0.0, 0.0, float(b))[0] for b in BEARING])
 
 
-def fitted(range_m: np.ndarray, sd_m: float = 0.03):
+def fitted(range_m: NDArray[np.float64], sd_m: float = 0.03) -> Fit:
     return fit_walls(BEARING, range_m, np.full(200, sd_m), STEP_RAD, closed=True)
 
 
 @given(seed=st.integers(0, 1000))
 @settings(max_examples=10, deadline=None)
-def test_neighbours_together_know_their_wall_better_than_each_alone(seed: int):
+def test_neighbours_together_know_their_wall_better_than_each_alone(seed: int) -> None:
     noise_m = np.random.default_rng(seed).normal(0.0, 0.03, 200)
     fit = fitted(TRUE_M + noise_m)
     along = TRUE_M < 3.2
@@ -33,7 +34,7 @@ def test_neighbours_together_know_their_wall_better_than_each_alone(seed: int):
     assert np.mean(np.abs(fit.range_m - TRUE_M) < 3.0 * fit.sd_m) > 0.9
 
 
-def test_a_straight_wall_stays_straight_up_to_its_corner():
+def test_a_straight_wall_stays_straight_up_to_its_corner() -> None:
     fit = fitted(TRUE_M)
     assert np.isfinite(fit.range_m).mean() > 0.95
     assert np.nanmax(np.abs(fit.range_m - TRUE_M)) < 0.035
@@ -41,7 +42,7 @@ def test_a_straight_wall_stays_straight_up_to_its_corner():
     assert 1.0 / np.hypot(*fit.wall[south].T) == pytest.approx(3.0, abs=1e-6)
 
 
-def test_silent_beams_have_no_wall_and_spoil_none():
+def test_silent_beams_have_no_wall_and_spoil_none() -> None:
     range_m = np.where(np.arange(200) % 3 == 0, np.nan, TRUE_M)
     fit = fitted(range_m)
     assert np.isnan(fit.range_m[::3]).all()
@@ -51,7 +52,7 @@ def test_silent_beams_have_no_wall_and_spoil_none():
     assert np.isnan(fitted(np.full(200, np.nan)).range_m).all()
 
 
-def test_the_line_of_the_walls_beside_a_silent_beam_is_expected_there():
+def test_the_line_of_the_walls_beside_a_silent_beam_is_expected_there() -> None:
     sure = np.ones(200, dtype=bool)
     sure[60:70] = False
     expected = expected_m(BEARING, fitted(TRUE_M).wall, sure, STEP_RAD, closed=True)
@@ -59,7 +60,7 @@ def test_the_line_of_the_walls_beside_a_silent_beam_is_expected_there():
     assert np.isnan(expected_m(BEARING, np.full((200, 2), np.nan), ~sure & False, STEP_RAD, closed=True)).all()
 
 
-def test_sides_of_a_sector_do_not_reach_over_its_ends():
+def test_sides_of_a_sector_do_not_reach_over_its_ends() -> None:
     sure = np.array([False, True, False, False, True, False])
     before, after = sides(sure, 2, closed=False)
     np.testing.assert_array_equal(before, [-1, 1, 1, 1, 4, 4])
@@ -67,7 +68,7 @@ def test_sides_of_a_sector_do_not_reach_over_its_ends():
     np.testing.assert_array_equal(sides(sure, 2, closed=True)[0], [4, 1, 1, 1, 4, 4])
 
 
-def test_a_faint_glimpse_behind_the_walls_is_none_and_a_clear_one_is():
+def test_a_faint_glimpse_behind_the_walls_is_none_and_a_clear_one_is() -> None:
     range_m, level = TRUE_M.copy(), np.full(200, 100.0)
     range_m[98:103] += 2.0
     sure, wall = np.ones(200, dtype=bool), fitted(TRUE_M).wall
@@ -84,7 +85,7 @@ def room_echoes(level: float = 100.0) -> np.ndarray:
     return echoes
 
 
-def test_what_stands_before_a_wall_without_hiding_it_is_passed():
+def test_what_stands_before_a_wall_without_hiding_it_is_passed() -> None:
     echoes = room_echoes()
     echoes[98:102, 60] = 90.0
     bins = echoes.argmax(axis=1)
@@ -97,7 +98,7 @@ def test_what_stands_before_a_wall_without_hiding_it_is_passed():
     assert (veils(echoes, bins, BIN_M, STEP_RAD) == 1.0).all()
 
 
-def test_a_mirror_image_of_the_room_is_none():
+def test_a_mirror_image_of_the_room_is_none() -> None:
     fit = fitted(TRUE_M)
     range_m = TRUE_M.copy()
     ghost = slice(108, 116)  # seen past the south wall: the west wall's image, which goes straight on
@@ -112,7 +113,7 @@ def test_a_mirror_image_of_the_room_is_none():
     assert not images(BEARING, range_m, fit.wall, np.zeros(200, dtype=bool), Heard(echoes, BIN_M, 0.0)).any()
 
 
-def test_a_wall_within_the_ringing_stands_out_of_it():
+def test_a_wall_within_the_ringing_stands_out_of_it() -> None:
     rng = np.random.default_rng(1)
     echoes = np.clip(rng.normal(20.0, 5.0, (200, 400)), 0, 255)
     echoes[:, :30] = 100.0 + rng.normal(0.0, 3.0, (200, 30))
@@ -124,7 +125,7 @@ def test_a_wall_within_the_ringing_stands_out_of_it():
     assert smoothed(clear, BIN_M)[:80, 9:11].min() > 120.0
 
 
-def test_the_side_lobe_of_a_clear_wall_counts_less_and_the_wall_itself_in_full():
+def test_the_side_lobe_of_a_clear_wall_counts_less_and_the_wall_itself_in_full() -> None:
     smooth = np.full((200, 300), 20.0)
     smooth[50, 100] = 150.0
     smooth[[44, 56], 100] = 90.0
@@ -137,14 +138,14 @@ def test_the_side_lobe_of_a_clear_wall_counts_less_and_the_wall_itself_in_full()
 
 @given(range_m=st.floats(0.5, 7.0))
 @settings(max_examples=25, deadline=None)
-def test_the_centre_of_an_echo_is_where_its_power_is(range_m: float):
+def test_the_centre_of_an_echo_is_where_its_power_is(range_m: float) -> None:
     bins_m = (np.arange(450) + 0.5) * BIN_M
     level = np.maximum(120.0 - 0.5 * 32.0 / 10.0 * ((bins_m - range_m) / 0.02) ** 2, 0.0)[None, :]
     centre = centre_m(level, np.zeros(450), level.argmax(axis=1), BIN_M)
     assert centre[0] == pytest.approx(range_m, abs=0.002)
 
 
-def test_echoes_read_long_by_the_beams_height_but_no_more_than_the_window_takes_in():
+def test_echoes_read_long_by_the_beams_height_but_no_more_than_the_window_takes_in() -> None:
     longer = longer_m(np.array([0.5, 2.0, 5.0, 50.0]), math.radians(17.5))
     assert (np.diff(longer) > 0.0).all()
     assert longer[0] - TAIL_M == pytest.approx(0.004, abs=0.002)
@@ -152,7 +153,7 @@ def test_echoes_read_long_by_the_beams_height_but_no_more_than_the_window_takes_
     assert longer_m(np.array([3.0]), 1e-3)[0] == pytest.approx(TAIL_M, abs=1e-4)
 
 
-def test_the_peak_nearest_to_an_expected_place_is_taken():
+def test_the_peak_nearest_to_an_expected_place_is_taken() -> None:
     excess = np.zeros((3, 300))
     excess[0, [100, 106]] = 50.0
     excess[1, 140] = 50.0

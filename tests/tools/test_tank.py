@@ -47,7 +47,9 @@ def test_what_is_no_recording_of_a_tank_is_refused(tmp_path: Path) -> None:
     np.savez(tmp_path / "other.npz", a=np.zeros(3))
     with pytest.raises(DataError, match="not a recording"):
         tank_scans(tmp_path / "other.npz", 1)
-    silent = Scan(0, 0, 1, 0.0, math.nan, np.arange(200) * 0.0314, np.zeros((200, 400), np.uint8), 0.02, 0.0314, "full")
+    silent = Scan(
+        0, 0, 1, 0.0, math.nan, np.linspace(0.0, 6.28, 200), np.zeros((200, 400), np.uint8), 0.02, 0.0314, "full"
+    )
     with pytest.raises(DataError, match="0 sure beams"):
         judge_beams([silent], Map())
 
@@ -56,7 +58,7 @@ def beside_a_wall(width_m: float, length_m: float, x_m: float, seed: int) -> tup
     """Circle of a head 17 cm from a tank's wall, ringing to 0.7 m, and the true range of each beam."""
     walls = (Wall(np.array(rectangle(0.0, 0.0, width_m, length_m))),)
     model = EchoModel(Site("tank", walls, floor_m=1.4, stops=(Stop(1, 1, 0.7, 0),), material=TILE), seed)
-    bearing = np.arange(200) * math.radians(1.8)
+    bearing = np.linspace(0.0, math.tau, 200, endpoint=False)
     pings = [model.ping(Place(x_m, 0.17, 0.7, 0.0), float(b), Sampling(0.025, 400), i) for i, b in enumerate(bearing)]
     bins_m = (np.arange(400) + 0.5) * 0.025
     ringing_db = np.interp(bins_m, (0.05, 0.06, 0.1, 0.2, 0.5, 0.6, 0.7, 0.8), (-40, 20, 33, 34, 30, 24, 20, -40))
