@@ -25,7 +25,7 @@ HINT_LOG_ODDS = 0.5
 """Occupied by no more than this is a hint: hints of several scans are not added up, for they err alike."""
 VAGUE_LOG_ODDS = 0.45
 """A vague return's hint, within its standard deviation."""
-BACK_M = 0.1
+BACK_M = 0.05
 """Behind its face a wall goes on at least so far, hardly seen: a hint."""
 PLACE_SD_M = 0.005
 """What a station's place and its compass add to the range's standard deviation."""

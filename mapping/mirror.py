@@ -26,7 +26,7 @@ HEARD: Final = 25.0
 """Counts above the floor of the mirror's own echo, within ``ECHO_M`` of its line."""
 BESIDE_RAD: Final = math.radians(90.0)
 """The mirror was seen within this of the beam ..."""
-VOTES: Final = 3
+VOTES: Final = 6
 """... by so many beams."""
 
 
