@@ -38,6 +38,7 @@ class Stations:
 
     def __init__(self, config: Map) -> None:
         self._config = config
+        self._canvas = grids.Canvas(config)
         self._stations: list[Station] = []
         self._sights: list[Sight] = []
         self._hints: list[Hint | None] = []
@@ -71,7 +72,7 @@ class Stations:
     def grid(self) -> Grid:
         """Draw the evidence of the placed stations."""
         placed = self._of_piece(0)
-        return grids.render([(self._stations[k].pose, self._sights[k].evidence) for k in placed], self._config)
+        return self._canvas.render([(self._stations[k].pose, self._sights[k].evidence) for k in placed])
 
     def _of_piece(self, piece: int) -> list[int]:
         """Stations that hold a piece together; of piece 0 those that are placed."""
