@@ -7,6 +7,7 @@ import json
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import asdict
+from itertools import product
 from pathlib import Path
 from typing import Final
 
@@ -14,6 +15,7 @@ from config.errors import UsageError
 from config.schema import Map
 from tools.bench import acquisition, beams, holes, holes_maps, holes_paper, holes_table, stations, tank, truth
 from tools.emulator.site import SITES
+from tools.emulator.vehicle import PILOTS
 
 Row = dict[str, str | int | float]
 
@@ -27,6 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--data", type=Path, default=Path("../shared/data"), metavar="DIR", help="real recordings")
     parser.add_argument("--seeds", type=int, default=2, metavar="N", help="emulated dives per site (default: 2)")
     parser.add_argument("--sites", default="keyhole", metavar="LIST", help="truth: emulated sites (default: keyhole)")
+    parser.add_argument("--pilots", default="steady", metavar="LIST", help="truth: how they rest (default: steady)")
     parser.add_argument("--quick", action="store_true", help="acquisition: a short run, for a first look")
     parser.add_argument("--half", choices=("tune", "report"), default="report", help="holes: maps to measure on")
     parser.add_argument("--maps", type=int, default=4, metavar="K", help="holes: damaged pieces per map (default: 4)")
@@ -43,6 +46,8 @@ def run(args: argparse.Namespace) -> int:
         raise UsageError(f"there is no bench {', '.join(sorted(wrong))}; choose of {', '.join(_BENCHES)}")
     if unknown := set(args.sites.split(",")) - set(SITES):
         raise UsageError(f"there is no site {', '.join(sorted(unknown))}; choose of {', '.join(sorted(SITES))}")
+    if strange := set(args.pilots.split(",")) - set(PILOTS):
+        raise UsageError(f"there is no pilot {', '.join(sorted(strange))}; choose of {', '.join(sorted(PILOTS))}")
     for name in args.benches or _BENCHES:
         if name in _ON_DATA and not args.benches and not args.data.is_dir():
             print(f"{name}: left out, no recordings in {args.data} (name their folder with --data)")
@@ -74,9 +79,9 @@ def _tank(args: argparse.Namespace) -> Iterator[Row]:
 
 
 def _truth(args: argparse.Namespace) -> Iterator[Row]:
-    for seed in range(1, args.seeds + 1):
+    for pilot, seed in product(args.pilots.split(","), range(1, args.seeds + 1)):
         for site in args.sites.split(","):
-            yield asdict(truth.measure(site, seed))
+            yield asdict(truth.measure(site, seed, pilot))
 
 
 def _stations(args: argparse.Namespace) -> Iterator[Row]:

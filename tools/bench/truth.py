@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import nan
 from typing import Final
 
 import numpy as np
@@ -19,7 +20,7 @@ from tools.bench.walls import distance_to_walls_m, walls_in_view_m
 from tools.emulator.dive import Dive, DiveOptions
 from tools.emulator.record import record
 from tools.emulator.site import SITES
-from tools.emulator.vehicle import Rest
+from tools.emulator.vehicle import PILOTS, Rest
 
 WITHIN_CELLS: Final = 1.5
 """A wall cell is right if its centre is no farther from true wall than the cell next to the wall's own is."""
@@ -27,15 +28,26 @@ WITHIN_CELLS: Final = 1.5
 WRONG_M: Final = 0.5
 """A placed station farther than this from where it was is wrong, and confident."""
 
+PASSAGES: Final = ("gallery", "loop", "tunnel")
+"""Sites that have an axis."""
+
+IN_95: Final = 5.99
+"""Square of the distance, in standard deviations, within which 95 % of a normal in the plane lie."""
+
+Floats = NDArray[np.float64]
+
 
 @dataclass(frozen=True, slots=True)
 class TruthFigures:
     """One dive held against the truth; lengths in m, angles in degrees, after the best rigid alignment of the stations.
 
-    ``stray`` counts placed stations that were made while the vehicle was under way.
+    ``stray`` counts placed stations that were made while the vehicle was under way.  ``covered`` is the share of placed
+    stations within their stated 95 % ellipse about the origin's true place; ``across_max_m`` the greatest error across
+    a passage, nan at sites that are none; ``sd_max_m`` the widest ellipse that was stated.
     """
 
     site: str
+    pilot: str
     seed: int
     rests: int
     placed: int
@@ -43,12 +55,47 @@ class TruthFigures:
     stray: int
     pieces: int
     wrong: int
+    covered: float
     error_median_m: float
     error_95_m: float
     error_max_m: float
+    across_max_m: float
+    sd_max_m: float
     heading_max_deg: float
     wall_precision: float
     wall_recall: float
+
+
+@dataclass(frozen=True, slots=True)
+class Errors:
+    """Placed stations against the truth, in true axes, the origin first: ``(n, 2)`` each but ``heading_rad`` ``(n,)``.
+
+    ``fitted_m`` is what the best rigid alignment leaves, ``anchored_m`` the same with the origin at its true place;
+    ``covariance`` ``(n, 2, 2)`` is the stated one, ``course`` the direction of the dive at the rest.
+    """
+
+    fitted_m: Floats
+    anchored_m: Floats
+    heading_rad: Floats
+    covariance: Floats
+    course: Floats
+
+    @property
+    def covered(self) -> float:
+        """Share within the stated 95 % ellipse, the origin left out; 1 where it is alone."""
+        solved = np.linalg.solve(self.covariance[1:], self.anchored_m[1:, :, None])[..., 0]
+        inside = (solved * self.anchored_m[1:]).sum(axis=1) <= IN_95
+        return float(inside.mean()) if len(inside) else 1.0
+
+    @property
+    def across_m(self) -> Floats:
+        """Errors across the course ``(n,)``."""
+        return np.asarray(np.abs(self.fitted_m[:, 0] * self.course[:, 1] - self.fitted_m[:, 1] * self.course[:, 0]))
+
+    @property
+    def sd_m(self) -> Floats:
+        """Stated standard deviation along the long axis ``(n,)``."""
+        return np.asarray(np.sqrt(np.linalg.eigvalsh(self.covariance)[:, 1]))
 
 
 def dive_records(dive: Dive) -> Iterator[Record]:
@@ -57,33 +104,28 @@ def dive_records(dive: Dive) -> Iterator[Record]:
         yield Chunk(piece.t_ns, piece.t_ns, piece.port, "tx" if piece.direction == "tx" else "rx", piece.data)
 
 
-def measure(site: str, seed: int, stations: int | None = None) -> TruthFigures:
+def measure(site: str, seed: int, pilot: str = "steady", stations: int | None = None) -> TruthFigures:
     """Dive in ``site`` with the default configuration and judge the map."""
-    dive = Dive(SITES[site](), seed, DiveOptions(stations=stations))
+    dive = Dive(SITES[site](), seed, DiveOptions(stations=stations, vehicle=PILOTS[pilot]))
     config = Config(site=Site(name=site), feed=(Feed(),))
     pipeline = Pipeline(config)
     for each in dive_records(dive):
         pipeline.push(each)
     pipeline.finish()
-    return judge(dive, pipeline.state, config)
+    return judge(dive, pipeline.state, config, pilot)
 
 
-def judge(dive: Dive, state: MapState, config: Config) -> TruthFigures:
+def judge(dive: Dive, state: MapState, config: Config, pilot: str = "steady") -> TruthFigures:
     """Hold the map of a dive against where the vehicle and the walls truly were."""
     rests = dive.vehicle.rests
     placed = [station for station in state.stations if station.status == "placed"]
     pairs = [(station, rest) for station in placed if (rest := _rest_of(station, rests)) is not None]
-    found_m = np.array([[station.pose.x_m, station.pose.y_m] for station, _ in pairs])
-    true_m = np.array([[rest.stop.x_m, rest.stop.y_m] for _, rest in pairs])
-    turn_rad = float(np.median([angle_between(s.pose.heading_rad, r.stop.heading_rad) for s, r in pairs]))
-    alignment = align(found_m, true_m, turn_rad)
-    errors_m = np.linalg.norm(alignment.apply(found_m) - true_m, axis=1)
-    headings_rad = [
-        abs(angle_between(s.pose.heading_rad + alignment.clockwise_rad, r.stop.heading_rad)) for s, r in pairs
-    ]
+    errors, alignment = errors_of(dive, pairs)
+    errors_m = np.linalg.norm(errors.fitted_m, axis=1)
     precision, recall = _walls(dive, state, alignment, config)
     return TruthFigures(
         site=dive.site.name,
+        pilot=pilot,
         seed=dive.seed,
         rests=len(rests),
         placed=len({rest.index for _, rest in pairs}),
@@ -91,13 +133,38 @@ def judge(dive: Dive, state: MapState, config: Config) -> TruthFigures:
         stray=len(placed) - len(pairs),
         pieces=len({station.piece for station in state.stations}),
         wrong=int((errors_m > WRONG_M).sum()),
+        covered=round(errors.covered, 3),
         error_median_m=round(float(np.median(errors_m)), 4),
         error_95_m=round(float(np.percentile(errors_m, 95)), 4),
         error_max_m=round(float(np.max(errors_m)), 4),
-        heading_max_deg=round(float(np.degrees(max(headings_rad))), 3),
+        across_max_m=round(float(errors.across_m.max()), 4) if dive.site.name in PASSAGES else nan,
+        sd_max_m=round(float(errors.sd_m.max()), 3),
+        heading_max_deg=round(float(np.degrees(errors.heading_rad.max())), 3),
         wall_precision=round(precision, 4),
         wall_recall=round(recall, 4),
     )
+
+
+def errors_of(dive: Dive, pairs: list[tuple[Station, Rest]]) -> tuple[Errors, Alignment]:
+    """Hold placed stations against where the vehicle was on average at their rests."""
+    places = [dive.place_during(rest) for _, rest in pairs]
+    found_m = np.array([[station.pose.x_m, station.pose.y_m] for station, _ in pairs])
+    true_m = np.array([[place.x_m, place.y_m] for place in places])
+    turns = [angle_between(s.pose.heading_rad, place.heading_rad) for (s, _), place in zip(pairs, places, strict=True)]
+    alignment = align(found_m, true_m, float(np.median(turns)))
+    fitted_m = alignment.apply(found_m) - true_m
+    turn = Alignment(alignment.clockwise_rad, np.zeros(2)).apply(np.eye(2))
+    covariance = np.array([turn.T @ station.covariance[:2, :2] @ turn for station, _ in pairs])
+    headings_rad = np.abs([angle_between(alignment.clockwise_rad, turned) for turned in turns])
+    return Errors(fitted_m, fitted_m - fitted_m[0], headings_rad, covariance, _courses(dive, pairs)), alignment
+
+
+def _courses(dive: Dive, pairs: list[tuple[Station, Rest]]) -> Floats:
+    """Direction ``(n, 2)`` from the stop before each rest to the one after it."""
+    stops = dive.site.stops
+    ends = [(stops[max(rest.index - 1, 0)], stops[min(rest.index + 1, len(stops) - 1)]) for _, rest in pairs]
+    way = np.array([[b.x_m - a.x_m, b.y_m - a.y_m] for a, b in ends])
+    return np.asarray(way / np.maximum(np.linalg.norm(way, axis=1), 1e-9)[:, None])
 
 
 def _rest_of(station: Station, rests: list[Rest]) -> Rest | None:
