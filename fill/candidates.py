@@ -56,7 +56,8 @@ class Candidate:
 
     ``path`` ``(n, 2)`` int32 of row and column, joined edge to edge from inside the one wall to inside the other;
     ``cells`` the same as a set; ``features`` after ``FEATURES``; ``half_a``, ``half_b`` half the thickness at either
-    end; ``start`` and ``finish`` x and y of both ends, in cells.
+    end; ``start`` and ``finish`` x and y of both ends, in cells; ``ends`` the two as they were found, where a wall is
+    met on its side the place that is met.
     """
 
     first: int
@@ -70,6 +71,7 @@ class Candidate:
     half_b: float
     start: tuple[float, float]
     finish: tuple[float, float]
+    ends: tuple[End, End]
 
 
 def across(first: int, second: int, walls: Walls, state: NDArray[np.uint8]) -> Candidate | None:
@@ -147,7 +149,7 @@ def _candidate(
     cells = frozenset((int(row), int(col)) for row, col in path)
     halves = ends[0].half, ends[1].half
     places = (ends[0].x, ends[0].y), (ends[1].x, ends[1].y)
-    return Candidate(*pair, curve.name, path, cells, gap, features, *halves, *places)
+    return Candidate(*pair, curve.name, path, cells, gap, features, *halves, *places, ends)
 
 
 def _meets(a: End, walls: Walls, state: NDArray[np.uint8], longest: float) -> tuple[float, float] | None:

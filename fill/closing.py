@@ -29,13 +29,15 @@ class Closed:
     """A hole that was closed.
 
     ``cells`` ``(n, 2)`` int32 were unknown and became wall, ``away`` ``(n,)`` float64 is each one's distance from the
-    nearer end in cells, ``chance`` the probability that the candidate is right.
+    nearer end in cells, ``chance`` the probability that the candidate is right, ``rivals`` the other
+    candidates of the same ends, with their chances.
     """
 
     candidate: Candidate
     cells: NDArray[np.int32]
     away: NDArray[np.float64]
     chance: float
+    rivals: tuple[tuple[Candidate, float], ...] = ()
 
 
 def close_holes(
@@ -75,10 +77,24 @@ def _close_round(
     chances = model.chance(np.stack([each.features for each in found]))
     closed: list[Closed] = []
     for index in assign(found, [gain(float(chance), threshold) for chance in chances]):
+        rivals = _rivals(found[index], found, chances)
         for cells in fill_cells(found[index], state, wall):
-            closed.append(Closed(found[index], cells, _away(cells, found[index]), float(chances[index])))
+            closed.append(Closed(found[index], cells, _away(cells, found[index]), float(chances[index]), rivals))
             wall[cells[:, 0], cells[:, 1]] = True
     return closed
+
+
+def _rivals(
+    taken: Candidate, found: list[Candidate], chances: NDArray[np.float64]
+) -> tuple[tuple[Candidate, float], ...]:
+    """Return the other candidates of the same ends, with their chances."""
+    ends = {taken.first, taken.second} - {-1}
+    shared = (
+        each
+        for each in zip(found, chances.tolist(), strict=True)
+        if not ends.isdisjoint((each[0].first, each[0].second))
+    )
+    return tuple((each, chance) for each, chance in shared if each is not taken)
 
 
 def _rounds(longest: float) -> Iterator[float]:
