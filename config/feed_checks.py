@@ -23,12 +23,14 @@ _HEEDED: Final[dict[str, tuple[str, ...]]] = {
     "depth_points": ("videoray_pro3",),
     "poll": ("videoray_pro4", "pressure"),
     "poll_hz": ("videoray_pro4", "pressure"),
+    "crc32": ("videoray_pro4",),
     "format": ("pressure",),
     "column": ("pressure",),
     "unit": ("pressure",),
     "pressure": ("nmea", "pressure"),
     "address": ("pressure",),
     "channel": ("pressure",),
+    "whole_pascals": ("pressure",),
 }
 """Keys that only some drivers heed."""
 

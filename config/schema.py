@@ -64,6 +64,7 @@ class Sonar(Section):
     range_m: float = Field(10.0, ge=0.3, le=300)
     bins: int = Field(400, ge=50, le=800, description="echo bins per ping")
     step_deg: float = Field(1.8, ge=0.225, le=7.2, description="rounded to 1/16 gradian")
+    bits: Literal[4, 8] = Field(8, description="to an echo; 4 halve the time on the line and coarsen the echoes")
     gain_pct: float = Field(50.0, ge=0, le=100)
     sound_speed_m_s: float = Field(1481.0, ge=1350, le=1650)
     head_type: Literal["dst", "non-dst"] = "dst"
@@ -118,6 +119,7 @@ class Feed(Section):
         None, ge=500, le=1200, description="absolute pressure at the surface; absent: 1013.25 until a tare"
     )
     max_dive_m_s: float = Field(3.0, gt=0, le=100, description="faster dives are jumps of the depth")
+    max_climb_m_s: float = Field(5.0, gt=0, le=100, description="faster changes are jumps of the altitude")
 
     checksum: Literal["require", "warn", "ignore"] = Field("require", description="nmea")
     dpt: Literal["vehicle_depth", "altitude"] = Field(
@@ -144,6 +146,7 @@ class Feed(Section):
     )
     poll: bool = Field(False, description="videoray_pro4, pressure (keller): ask for data; one program may on a line")
     poll_hz: float = Field(5.0, gt=0, le=10)
+    crc32: bool = Field(False, description="videoray_pro4, polled: the vehicle is one that checks packets by CRC-32")
 
     format: Literal["text", "keller"] = Field("text", description="pressure: lines of text, or Keller's bus")
     column: int = Field(1, ge=1, le=64, description="pressure (text): the number that counts, from 1")
@@ -153,6 +156,7 @@ class Feed(Section):
     pressure: Literal["absolute", "gauge"] = Field("absolute", description="nmea (XDR), pressure: gauge is 0 in air")
     address: int = Field(250, ge=1, le=250, description="pressure (keller): 250 is any single sensor")
     channel: int = Field(1, ge=0, le=2, description="pressure (keller): 0 calculated, 1 P1, 2 P2")
+    whole_pascals: bool = Field(False, description="pressure (keller), polled: ask in whole pascals (function 74)")
 
 
 class Map(Section):

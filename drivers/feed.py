@@ -24,6 +24,8 @@ from drivers.statements import Meaning, Message, Reader, Statement
 _TURN_SLACK_DEG: Final = 15.0
 """Sentences that a network delivers together have one date, and a turning vehicle some degrees between them."""
 _DIVE_SLACK_M: Final = 0.5
+_CLIMB_SLACK_M: Final = 1.0
+"""Steps and boulders pass below a vehicle at once."""
 _LEAST_MBAR: Final = 500.0
 _DEEPEST_M: Final = 12_000.0
 _TARE_NS: Final = 5_000_000_000
@@ -44,6 +46,7 @@ class FeedDecoder:
         self._field = GOOD
         self._turns = JumpGate(feed.max_turn_deg_s, _TURN_SLACK_DEG, "degrees", turn=360.0)
         self._dives = JumpGate(feed.max_dive_m_s, _DIVE_SLACK_M, "m")
+        self._climbs = JumpGate(feed.max_climb_m_s, _CLIMB_SLACK_M, "m")
         self._latency_ns = round(feed.latency_ms * 1e6)
 
     @property
@@ -138,6 +141,8 @@ class FeedDecoder:
         if "altitude" not in self._feed.provides:
             return None
         opinion = _opinion(said)
+        if opinion.quality != "bad":
+            opinion = worst(opinion, self._climbs.judge(name, t_ns, said.value))
         return Altitude(t_ns, said.value, self._source(name), opinion.quality, opinion.reason)
 
     def _field_opinion(self, strength: float) -> Opinion:

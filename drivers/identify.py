@@ -15,6 +15,7 @@ from config.schema import Feed, Quantity, Site
 from drivers.decoders import FEEDS
 from drivers.feed import FeedDecoder
 from drivers.framed import FrameReader
+from drivers.guess import guess_columns
 from drivers.keller import Keller
 from drivers.mavlink import Mavlink
 from drivers.nmea import NmeaReader
@@ -86,6 +87,9 @@ def _tritech(pieces: Pieces, size: int) -> Heard | None:
 
 
 def _feed(feed: Feed, pieces: Pieces, size: int) -> Heard | None:
+    is_text = (feed.driver, feed.format) == ("pressure", "text")
+    columns = guess_columns(b"".join(data for _, data in pieces)) if is_text else None
+    feed = feed.model_copy(update=columns or {})
     reader = FEEDS[feed.driver](feed)
     decoder = FeedDecoder(feed, Site(), reader)
     readings = [reading for t_ns, data in pieces for reading in decoder.push(t_ns, data)] + decoder.finish()
@@ -99,8 +103,9 @@ def _feed(feed: Feed, pieces: Pieces, size: int) -> Heard | None:
     settings: dict[str, Json] = {"driver": feed.driver, "name": feed.driver}
     if feed.format == "keller":
         settings["format"] = "keller"
+    settings |= columns or {}
     settings["provides"] = [each for each in _QUANTITIES.values() if each in told]
-    says, advice = _described(reader), _advice(reader)
+    says, advice = _described(reader), "" if columns else _advice(reader)
     return Heard(feed.driver, "feed", says, dict(counters.frames), share, settings, advice)
 
 
@@ -115,8 +120,8 @@ def _described(reader: Reader) -> str:
             return "VideoRay Pro 3"
         case Pro4():
             return "VideoRay Pro 4"
-        case Keller():
-            return "Keller pressure sensor"
+        case Keller(serial=serial):
+            return "Keller pressure sensor" + (f", serial number {serial}" if serial is not None else "")
         case _:
             return "numbers in lines of text"
 

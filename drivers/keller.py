@@ -1,4 +1,6 @@
-"""Keller pressure sensors on their own bus (function 73): pressures in bar, from replies that somebody asked for.
+"""Keller pressure sensors on their own bus: pressures from replies that somebody asked for.
+
+Function 73 gives them in bar (floating point), function 74 in whole pascals, function 69 the sensor's serial number.
 
 Requests and replies share the line: adapters give back what is sent, and another program's requests may be heard.
 They are told apart by their function, size and checksum (the one of Modbus, but with its high byte first).
@@ -18,15 +20,19 @@ from drivers.statements import Meaning, Statement
 from drivers.wire import MORE, byte_ns
 
 _START: Final = re.compile(rb"[\x01-\xfa]")
+_INITIALISE: Final = 48
+_SERIAL: Final = 69
 _READ: Final = 73
+_READ_WHOLE: Final = 74
 _REFUSED: Final = 0x80
 _REFUSAL_SIZE: Final = 5
-_SIZES: Final = {30: (5, 8), 48: (4, 10), 69: (4, 8), _READ: (5, 9), 74: (5, 9), 95: (5, 9)}
-"""Sizes of requests and replies by function."""
+_SIZES: Final = {30: (5, 8), _INITIALISE: (4, 10), _SERIAL: (4, 8), _READ: (5, 9), _READ_WHOLE: (5, 9), 95: (5, 9)}
+"""Sizes of requests and replies by function (30 reads a coefficient, 95 sets a zero: heard, never sent)."""
 _ANY: Final = 250
 """Address that any single sensor heeds."""
 _STANDARD_CHECK: Final = 0x80
 _MBAR_PER_BAR: Final = 1000.0
+_MBAR_PER_PA: Final = 0.01
 
 
 def crc16(data: bytes | bytearray) -> int:
@@ -46,12 +52,17 @@ def with_crc(body: bytes) -> bytes:
 
 def initialise(address: int) -> bytes:
     """Ask a sensor to get ready, as it must be after each start; nothing in it is changed."""
-    return with_crc(bytes((address, 48)))
+    return with_crc(bytes((address, _INITIALISE)))
 
 
-def read_channel(address: int, channel: int) -> bytes:
-    """Ask a sensor for a channel: 0 calculated, 1 P1, 2 P2."""
-    return with_crc(bytes((address, _READ, channel)))
+def read_serial(address: int) -> bytes:
+    """Ask a sensor for its serial number."""
+    return with_crc(bytes((address, _SERIAL)))
+
+
+def read_channel(address: int, channel: int, *, whole: bool = False) -> bytes:
+    """Ask a sensor for a channel: 0 calculated, 1 P1, 2 P2; with ``whole`` in whole pascals."""
+    return with_crc(bytes((address, _READ_WHOLE if whole else _READ, channel)))
 
 
 def judge(buffer: bytearray, at: int, _is_synced: bool) -> int | str:
@@ -73,13 +84,15 @@ def judge(buffer: bytearray, at: int, _is_synced: bool) -> int | str:
 class Keller:
     """Pressures of the configured channel; which one a reply holds is known from the request before it, if heard.
 
-    Counted are ``reply``, ``request``, ``other`` and ``other_sensor`` (or channel); a refusal is ``exception_32`` where
-    the sensor was not initialised.
+    Counted are ``reply``, ``serial``, ``request``, ``other`` and ``other_sensor`` (or channel); a refusal is
+    ``exception_32`` where the sensor was not initialised.
     """
 
     def __init__(self, feed: Feed) -> None:
         self._address = feed.address
         self._channel = self._asked = feed.channel
+        self.serial: int | None = None
+        """Serial number of the configured sensor, where it was told."""
 
     def read(self, frame: bytes) -> Said:
         """Return the name of a frame and what it says."""
@@ -87,24 +100,34 @@ class Keller:
         if function & _REFUSED:
             raise FrameError(f"exception_{frame[2]}")
         if len(frame) == _SIZES[function][0]:
-            self._asked = frame[2] if function == _READ else self._asked
+            self._asked = frame[2] if function in (_READ, _READ_WHOLE) else self._asked
             return "request", ()
-        if function != _READ:
+        is_ours = self._address in (_ANY, frame[0])
+        if function == _SERIAL and is_ours:
+            self.serial = int.from_bytes(frame[2:6], "big")
+            return "serial", ()
+        if function not in (_READ, _READ_WHOLE):
             return "other", ()
-        if self._address not in (_ANY, frame[0]) or self._asked != self._channel:
+        if not is_ours or self._asked != self._channel:
             return "other_sensor", ()
         return "reply", (self._pressure(frame),)
 
     def _pressure(self, frame: bytes) -> Statement:
-        (bar,) = struct.unpack_from(">f", frame, 2)
-        if not math.isfinite(bar):
+        mbar, status = _mbar(frame), frame[6]
+        if not math.isfinite(mbar):
             raise FrameError("field")
-        mbar, status = bar * _MBAR_PER_BAR, frame[6]
         if status & 1 << self._channel:
             return Statement(Meaning.PRESSURE, mbar, "bad", "the sensor calls its channel invalid")
         if status & _STANDARD_CHECK:
             return Statement(Meaning.PRESSURE, mbar, "suspect", "the sensor's own check failed")
         return Statement(Meaning.PRESSURE, mbar)
+
+
+def _mbar(frame: bytes) -> float:
+    if frame[1] == _READ_WHOLE:
+        return int.from_bytes(frame[2:6], "big", signed=True) * _MBAR_PER_PA
+    (bar,) = struct.unpack_from(">f", frame, 2)
+    return float(bar) * _MBAR_PER_BAR
 
 
 def keller_reader(feed: Feed) -> FrameReader:

@@ -8,8 +8,8 @@ from __future__ import annotations
 from typing import Final
 
 from config.schema import Feed
-from drivers.keller import initialise, read_channel
-from drivers.videoray_pro4 import NAVIGATION_REQUEST
+from drivers.keller import initialise, read_channel, read_serial
+from drivers.videoray_pro4 import navigation_request
 
 _NS: Final = 1_000_000_000
 _READS_PER_START: Final = 20
@@ -37,7 +37,8 @@ class Poller:
 
 def _round(feed: Feed) -> list[bytes]:
     if feed.driver == "videoray_pro4":
-        return [NAVIGATION_REQUEST]
+        return [navigation_request(crc=feed.crc32)]
     if feed.driver == "pressure" and feed.format == "keller":
-        return [initialise(feed.address), *[read_channel(feed.address, feed.channel)] * _READS_PER_START]
+        reads = [read_channel(feed.address, feed.channel, whole=feed.whole_pascals)] * _READS_PER_START
+        return [initialise(feed.address), read_serial(feed.address), *reads]
     return []

@@ -18,9 +18,9 @@ from drivers.wire import Arrivals, byte_ns
 
 _LONGEST: Final = 256
 _END: Final = re.compile(rb"[\r\n]")
-_BETWEEN: Final = re.compile(r"[,;\s]+")
-_NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)")
-_MBAR: Final = {
+BETWEEN: Final = re.compile(r"[,;\s]+")
+NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)")
+MBAR: Final = {
     "mbar": 1.0,
     "hpa": 1.0,
     "bar": 1000.0,
@@ -29,7 +29,7 @@ _MBAR: Final = {
     "pa": 0.01,
     "psi": 68.947573,
 }
-_METRES: Final = {"m": 1.0, "ft": 0.3048}
+METRES: Final = {"m": 1.0, "ft": 0.3048}
 
 
 def pressure_reader(feed: Feed) -> Reader:
@@ -91,15 +91,15 @@ class TextReader:
         line, self._line = self._line, bytearray()
         if not line:
             return []
-        words = _BETWEEN.split(line.decode("ascii", "replace").strip())
+        words = BETWEEN.split(line.decode("ascii", "replace").strip())
         word = words[self._column - 1] if self._column <= len(words) else ""
-        if not _NUMBER.fullmatch(word):
+        if not NUMBER.fullmatch(word):
             self._bad["field"] += 1
             return []
         self._frames["line"] += 1
         return [Message(self._t_ns, "line", (self._statement(float(word)),))]
 
     def _statement(self, value: float) -> Statement:
-        if self._unit in _METRES:
-            return Statement(Meaning.DEPTH, value * _METRES[self._unit])
-        return Statement(Meaning.PRESSURE, value * _MBAR[self._unit])
+        if self._unit in METRES:
+            return Statement(Meaning.DEPTH, value * METRES[self._unit])
+        return Statement(Meaning.PRESSURE, value * MBAR[self._unit])

@@ -3,6 +3,8 @@
 A packet is two bytes of synchronisation, id, flags, address, length, the exclusive or of these six, payload, and the
 exclusive or of the payload.  Length 255 announces a longer one: two bytes, little-endian, and their exclusive or.
 
+Newer vehicles of the maker use other synchronisation and CRC-32 in the place of both checksums, else the same packets.
+
 Whoever asks, the replies are read: beside VideoRay's own program, or polled by `drivers.polls` with a request that
 carries no data and so writes nothing.
 """
@@ -11,6 +13,7 @@ from __future__ import annotations
 
 import re
 import struct
+import zlib
 from functools import reduce
 from operator import xor
 from typing import Final
@@ -21,10 +24,13 @@ from drivers.framed import FrameReader, Said
 from drivers.statements import Meaning, Statement
 from drivers.wire import MORE, byte_ns
 
-_REQUEST: Final = b"\xfa\xaf"
-_RESPONSE: Final = b"\xfd\xdf"
-_START: Final = re.compile(rb"[\xfa\xfd]")
-_HEAD: Final = 7
+_REQUESTS: Final = (b"\xfa\xaf", b"\xf5\x5f")
+_RESPONSES: Final = (b"\xfd\xdf", b"\xf0\x0f")
+_CRC_SYNCS: Final = (_REQUESTS[1], _RESPONSES[1])
+_START: Final = re.compile(rb"[\xfa\xfd\xf5\xf0]")
+_FIELDS: Final = 6
+"""Bytes of the head before its checksum: synchronisation, id, flags, address, length."""
+_CRC: Final = 4
 _EXTENDED: Final = 255
 _LARGEST: Final = 4096
 _VEHICLE: Final = 1
@@ -37,18 +43,35 @@ _HEADING_AT: Final = 0x68
 
 NAVIGATION_REQUEST: Final = bytes.fromhex("faaf010500005100")
 """Asks for navigation and health with no data of its own: nothing in the vehicle is written."""
+NAVIGATION_REQUEST_CRC: Final = bytes.fromhex("f55f01050000")
+"""The same for newer vehicles, still without its checksums: see `navigation_request`."""
+
+
+def navigation_request(*, crc: bool) -> bytes:
+    """Return the request for navigation, as the vehicle's generation checks it."""
+    if not crc:
+        return NAVIGATION_REQUEST
+    head = _with_crc(NAVIGATION_REQUEST_CRC)
+    return _with_crc(head)
 
 
 def judge(buffer: bytearray, at: int, _is_synced: bool) -> int | str:
     """Judge the bytes at ``at`` as a packet, either way (`drivers.wire.Judge`)."""
-    head = bytes(buffer[at : at + _HEAD])
-    if len(head) >= 2 and head[:2] not in (_REQUEST, _RESPONSE):
+    sync = bytes(buffer[at : at + 2])
+    if len(sync) < 2:
+        return MORE
+    if sync not in _REQUESTS and sync not in _RESPONSES:
         return ""
-    if len(head) < _HEAD:
+    return _judge_crc(buffer, at) if sync in _CRC_SYNCS else _judge_xor(buffer, at)
+
+
+def _judge_xor(buffer: bytearray, at: int) -> int | str:
+    head = bytes(buffer[at : at + _FIELDS + 1])
+    if len(head) < _FIELDS + 1:
         return MORE
     if reduce(xor, head):
         return "header"
-    start, length = at + _HEAD, head[5]
+    start, length = at + _FIELDS + 1, head[5]
     if length == _EXTENDED:
         extension = buffer[start : start + 3]
         if len(extension) < 3:
@@ -59,6 +82,28 @@ def judge(buffer: bytearray, at: int, _is_synced: bool) -> int | str:
     if len(buffer) < start + length + 1:
         return MORE
     return "checksum" if reduce(xor, buffer[start : start + length + 1]) else start + length + 1 - at
+
+
+def _judge_crc(buffer: bytearray, at: int) -> int | str:
+    """CRC-32 of the first six bytes, then of all before; packets of extended length are described nowhere."""
+    start = at + _FIELDS + _CRC
+    if len(buffer) < start:
+        return MORE
+    length = buffer[at + 5]
+    if length == _EXTENDED or not _is_whole(buffer[at:start]):
+        return "header"
+    end = start + length + _CRC
+    if len(buffer) < end:
+        return MORE
+    return end - at if _is_whole(buffer[at:end]) else "checksum"
+
+
+def _is_whole(packet: bytearray) -> bool:
+    return zlib.crc32(packet[:-_CRC]) == int.from_bytes(packet[-_CRC:], "little")
+
+
+def _with_crc(body: bytes) -> bytes:
+    return body + zlib.crc32(body).to_bytes(_CRC, "little")
 
 
 class Pro4:
@@ -73,7 +118,7 @@ class Pro4:
 
     def read(self, frame: bytes) -> Said:
         """Return the name of a packet and what it says."""
-        if frame[:2] == _REQUEST:
+        if frame[:2] in _REQUESTS:
             return "request", ()
         found = _navigation(frame)
         if found is None:
@@ -92,7 +137,7 @@ def pro4_reader(feed: Feed) -> FrameReader:
 def _navigation(packet: bytes) -> tuple[str, int, int] | None:
     """Return kind, raw heading and pressure of a response that holds both."""
     flags, address = packet[3], packet[4]
-    payload = packet[_HEAD + 3 : -1] if packet[5] == _EXTENDED else packet[_HEAD:-1]
+    payload = _payload(packet)
     if not payload or payload[0] != _VEHICLE:
         return None
     if flags & _DUMP:
@@ -105,3 +150,9 @@ def _navigation(packet: bytes) -> tuple[str, int, int] | None:
         heading, _pitch, _roll, mbar = struct.unpack_from("<4h", payload, 1)
         return "navigation", heading, mbar
     return None
+
+
+def _payload(packet: bytes) -> bytes:
+    if packet[:2] in _CRC_SYNCS:
+        return packet[_FIELDS + _CRC : -_CRC]
+    return packet[_FIELDS + 4 : -1] if packet[5] == _EXTENDED else packet[_FIELDS + 1 : -1]

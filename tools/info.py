@@ -122,7 +122,7 @@ def _sonar(gathered: SessionFacts, config: Config) -> dict[str, Any]:
     if turning.pings_per_s and turning.settings:
         bins, bin_m = turning.settings[0]["bins"], turning.settings[0]["bin_m"]
         sampling_s = 2.0 * bins * bin_m / config.sonar.sound_speed_m_s
-        rules = limits(bins, sampling_s, config.sonar.baud).ruling(1.0 / turning.pings_per_s)
+        rules = limits(bins * config.sonar.bits // 8, sampling_s, config.sonar.baud).ruling(1.0 / turning.pings_per_s)
     return {
         "pings": turning.pings,
         "pings_per_s": turning.pings_per_s,

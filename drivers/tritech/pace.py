@@ -44,9 +44,9 @@ class Limits:
         return "line" if self.line_s >= self.sound_s else "sound"
 
 
-def limits(bins: int, sampling_s: float, baud: int, *, takes_turns: bool = False) -> Limits:
-    """Return the limits of pings of ``bins`` echoes of a byte each, sampled for ``sampling_s``."""
-    return Limits(sampling_s, (bins + _FRAME_BYTES) * _BITS / baud, takes_turns)
+def limits(echo_bytes: int, sampling_s: float, baud: int, *, takes_turns: bool = False) -> Limits:
+    """Return the limits of pings whose echoes take ``echo_bytes`` and are sampled for ``sampling_s``."""
+    return Limits(sampling_s, (echo_bytes + _FRAME_BYTES) * _BITS / baud, takes_turns)
 
 
 class Pace:

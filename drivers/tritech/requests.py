@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from drivers.tritech.commands import HeadParameters
+from drivers.tritech.headdata import Control
 from drivers.tritech.pace import Limits, Pace, limits
 
 _MOTOR_WAKES_NS: Final = 2_000_000_000
@@ -73,7 +74,8 @@ class RequestLoop:
     def change(self, parameters: HeadParameters, baud: int) -> None:
         """Go on with other parameters: pings still owed may come, or be forgotten by the head, or come late."""
         sampling_s = parameters.bins * parameters.ad_interval * _TICK_S
-        self.limits = limits(parameters.bins, sampling_s, baud, takes_turns=self._is_half_duplex)
+        echo_bytes = parameters.bins if parameters.control & Control.ADC_8_ON else parameters.bins // 2
+        self.limits = limits(echo_bytes, sampling_s, baud, takes_turns=self._is_half_duplex)
         slowest_s = max(self.limits.sound_s, self.limits.line_s)
         self._limit_ns = int((2 * slowest_s + _LATE_S) * 1e9)
         self._slow_start = self._is_excused = True

@@ -12,7 +12,9 @@ from drivers.tritech.headdata import USUAL_CONTROL, Control, HeadData
 
 HEAD_TYPES: Final = {"dst": 0x11, "non-dst": 0x02}
 _LOW_HZ, _HIGH_HZ = 325_000.0, 675_000.0
-_AD_LOW_DB, _AD_SPAN_DB = 13.0, 24.0
+_AD_DB: Final = {8: (13.0, 24.0), 4: (10.5, 42.5)}
+"""Least level and span of the echoes, by the bits of one: four bits must do for all levels that walls have."""
+
 _MOTOR_TIME: Final = 25
 _SLOPES: Final = (90, 125)
 
@@ -27,13 +29,13 @@ def head_command(sonar: Sonar) -> HeadCommand:
     that bit stays as Tritech's software sets it, and `bow_angle_rad` mirrors the angles, the sector's limits included.
     """
     interval, bins = units.sampling(sonar.range_m, sonar.bins, sonar.sound_speed_m_s)
-    control = USUAL_CONTROL if sonar.sector_deg else USUAL_CONTROL | Control.CONTINUOUS
+    low, span = _levels(sonar)
     left, right = _limits(sonar)
     gain = units.gain_byte(sonar.gain_pct)
     old = sonar.head_type == "non-dst"
     return HeadCommand(
         HeadParameters(
-            control=control | Control.CHANNEL_2 if sonar.channel == "high" else control,
+            control=_control(sonar),
             head_type=HEAD_TYPES[sonar.head_type],
             transmit_1=units.transmit_word(_LOW_HZ) if old else 0,
             transmit_2=units.transmit_word(_HIGH_HZ) if old else 0,
@@ -43,8 +45,8 @@ def head_command(sonar: Sonar) -> HeadCommand:
             range_scale=units.range_word(sonar.range_m),
             left_limit=left,
             right_limit=right,
-            ad_span=units.level_byte(_AD_SPAN_DB),
-            ad_low=units.level_byte(_AD_LOW_DB),
+            ad_span=span,
+            ad_low=low,
             gain_1=gain,
             gain_2=gain,
             slope_1=_SLOPES[0],
@@ -52,7 +54,7 @@ def head_command(sonar: Sonar) -> HeadCommand:
             motor_time=_MOTOR_TIME,
             step=units.step_units(sonar.step_deg),
             ad_interval=interval,
-            bins=bins,
+            bins=bins + bins % 2 if sonar.bits == 4 else bins,  # two to the byte
         ),
         gains=gains(sonar) if sonar.dual_channel else None,
     )
@@ -60,7 +62,7 @@ def head_command(sonar: Sonar) -> HeadCommand:
 
 def gains(sonar: Sonar) -> Gains:
     """Gains of both channels as configured: they are alike, so that it does not matter which one the head uses."""
-    span, low, gain = units.level_byte(_AD_SPAN_DB), units.level_byte(_AD_LOW_DB), units.gain_byte(sonar.gain_pct)
+    (low, span), gain = _levels(sonar), units.gain_byte(sonar.gain_pct)
     return Gains(span, span, low, low, gain, gain, slope_1=_SLOPES[0], slope_2=_SLOPES[1])
 
 
@@ -80,6 +82,18 @@ def matches(data: HeadData, wanted: HeadParameters) -> bool:
     if wanted.control & Control.CONTINUOUS:
         return same
     return same and (data.left_limit, data.right_limit) == (wanted.left_limit, wanted.right_limit)
+
+
+def _control(sonar: Sonar) -> Control:
+    control = USUAL_CONTROL if sonar.bits == 8 else USUAL_CONTROL & ~Control.ADC_8_ON
+    if sonar.sector_deg is None:
+        control |= Control.CONTINUOUS
+    return control | Control.CHANNEL_2 if sonar.channel == "high" else control
+
+
+def _levels(sonar: Sonar) -> tuple[int, int]:
+    low_db, span_db = _AD_DB[sonar.bits]
+    return units.level_byte(low_db), units.level_byte(span_db)
 
 
 def _bins(data: HeadData) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import zlib
 from functools import reduce
 from operator import xor
 
@@ -46,9 +47,23 @@ def pro4_packet(flags: int, address: int, payload: bytes, sync: bytes = b"\xfd\x
     return head + bytes((reduce(xor, head),)) + extension + payload + bytes((reduce(xor, payload, 0),))
 
 
-def pro4_navigation(heading: int, mbar: int, flags: int = 2) -> bytes:
+def pro4_words(heading: int, mbar: int) -> bytes:
     words = (heading, 37, -30, mbar)
-    return pro4_packet(flags, 0, b"\x01" + b"".join(word.to_bytes(2, "little", signed=True) for word in words))
+    return b"\x01" + b"".join(word.to_bytes(2, "little", signed=True) for word in words)
+
+
+def pro4_navigation(heading: int, mbar: int, flags: int = 2) -> bytes:
+    return pro4_packet(flags, 0, pro4_words(heading, mbar))
+
+
+def pro4_crc_packet(flags: int, address: int, payload: bytes, sync: bytes = b"\xf0\x0f") -> bytes:
+    head = sync + bytes((1, flags, address, len(payload)))
+    head += zlib.crc32(head).to_bytes(4, "little")
+    return head + payload + zlib.crc32(head + payload).to_bytes(4, "little")
+
+
+def keller_whole_reply(pascals: int, status: int = 0, address: int = 1) -> bytes:
+    return with_crc(bytes((address, 74)) + struct.pack(">iB", pascals, status))
 
 
 def keller_reply(bar: float, status: int = 0, address: int = 1) -> bytes:

@@ -149,6 +149,15 @@ def test_depths_that_jump_and_what_a_vehicle_can_do() -> None:
     assert [quality for quality, _ in opinions(readings)] == ["good", "good", "good", "bad", "good"]
 
 
+def test_altitudes_that_jump_and_steps_of_the_floor() -> None:
+    feed = Feed(port=NETWORK, provides=("altitude",), dpt="altitude", max_climb_m_s=1.0)
+    altitudes = [3.0, 2.5, 4.4, 30.0, 4.0, 12.0, 12.1, 12.0, 12.1]
+    readings, _ = run(feed, every_second(f"SDDPT,{altitude:.1f},0.0" for altitude in altitudes))
+    qualities = [quality for quality, _ in opinions(readings)]
+    assert qualities == ["good", "good", "good", "bad", "good", "bad", "bad", "suspect", "good"]
+    assert opinions(readings)[3][1] == "a jump of 25.6 m"
+
+
 @settings(max_examples=60, deadline=None)
 @given(st.lists(st.floats(-1e4, 1e4), max_size=40))
 def test_no_series_is_refused_for_ever(values: list[float]) -> None:

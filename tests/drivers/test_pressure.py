@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from config.schema import Feed, Site
-from drivers.keller import crc16, initialise, keller_reader, read_channel
+from drivers.keller import Keller, crc16, initialise, keller_reader, read_channel, read_serial, with_crc
 from drivers.polls import Poller
 from drivers.pressure import TextReader
-from tests.drivers.feedframes import keller_reply
+from tests.drivers.feedframes import keller_reply, keller_whole_reply
 from tests.drivers.feedkit import CUTS, assert_any_cut_is_the_same, opinions, plain, run
 
 TEXT = Feed(driver="pressure", port="/dev/p", surface_mbar=1013.25)
@@ -126,12 +126,34 @@ def test_what_a_keller_sensor_says_of_itself() -> None:
     assert run(other, [(0, keller_reply(1.2, address=2))])[1].frames == {"other_sensor": 1}
 
 
+def test_whole_pascals_and_the_serial_number() -> None:
+    asked = read_channel(250, 1, whole=True)
+    assert asked == with_crc(bytes((250, 74, 1)))
+    data = asked + keller_whole_reply(131_325) + keller_whole_reply(-50) + keller_whole_reply(120_000, 0b10)
+    readings, counters = run(KELLER, [(0, data)])
+    assert counters.frames == {"request": 1, "reply": 3}
+    assert plain(readings[0])[1] == pytest.approx(300 * M_PER_MBAR, abs=1e-5)
+    assert [quality for quality, _ in opinions(readings)] == ["good", "bad", "bad"]
+    # A temperature that another program asked for on the line is not taken for a pressure.
+    assert run(KELLER, [(0, read_channel(250, 4, whole=True) + keller_whole_reply(1934))])[0] == []
+    keller = Keller(KELLER)
+    assert keller.read(read_serial(250)) == ("request", ())
+    assert keller.read(with_crc(bytes((1, 69)) + (123_456).to_bytes(4, "big"))) == ("serial", ())
+    assert keller.serial == 123_456
+    other = Keller(KELLER.model_copy(update={"address": 3}))
+    assert other.read(with_crc(bytes((1, 69)) + bytes(4))) == ("other", ())
+    assert other.serial is None
+
+
 def test_a_keller_sensor_is_asked_and_made_ready_again() -> None:
     poller = Poller(KELLER.model_copy(update={"poll": True, "poll_hz": 5.0}))
     sent = [asked for t_ms in range(0, 10_000, 50) if (asked := poller.tick(t_ms * 1_000_000))]
     assert len(sent) == 50
-    assert [index for index, asked in enumerate(sent) if asked == initialise(250)] == [0, 21, 42]
-    assert set(sent) == {initialise(250), read_channel(250, 1)}
+    assert [index for index, asked in enumerate(sent) if asked == initialise(250)] == [0, 22, 44]
+    assert set(sent) == {initialise(250), read_serial(250), read_channel(250, 1)}
+    whole = Poller(KELLER.model_copy(update={"poll": True, "whole_pascals": True}))
+    asked = {whole.tick(t_ms * 1_000_000) for t_ms in range(0, 10_000, 50)}
+    assert asked == {b"", initialise(250), read_serial(250), read_channel(250, 1, whole=True)}
     assert Poller(TEXT.model_copy(update={"poll": True})).tick(0) == b""
 
 
@@ -139,7 +161,16 @@ TEXT_PIECES = st.lists(
     st.sampled_from([b"1013.2\r\n", b"1100,x\n", b"\r", b"11", b"\n"]) | st.binary(max_size=4), max_size=15
 ).map(b"".join)
 KELLER_PIECES = st.lists(
-    st.sampled_from([keller_reply(1.2), read_channel(250, 1), read_channel(250, 4), b"\xfa\x49", b"\x01\xc9"])
+    st.sampled_from(
+        [
+            keller_reply(1.2),
+            keller_whole_reply(120_000),
+            read_channel(250, 1),
+            read_channel(250, 4),
+            b"\xfa\x49",
+            b"\x01\xc9",
+        ]
+    )
     | st.binary(max_size=4),
     max_size=10,
 ).map(b"".join)

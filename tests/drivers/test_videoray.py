@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from config.schema import Feed, Site
 from drivers.polls import Poller
 from drivers.videoray_pro3 import Pro3, pro3_reader
-from drivers.videoray_pro4 import NAVIGATION_REQUEST, pro4_reader
-from tests.drivers.feedframes import PRO3_REQUEST, pro3_reply, pro4_navigation, pro4_packet
+from drivers.videoray_pro4 import NAVIGATION_REQUEST, navigation_request, pro4_reader
+from tests.drivers.feedframes import PRO3_REQUEST, pro3_reply, pro4_crc_packet, pro4_navigation, pro4_packet, pro4_words
 from tests.drivers.feedkit import CUTS, assert_any_cut_is_the_same, opinions, plain, run
 
 PRO3 = Feed(driver="videoray_pro3", port="/dev/p", depth_points=((1017, 0.0), (313, 34.2)), max_turn_deg_s=3600)
@@ -162,6 +162,24 @@ def test_only_the_request_without_data_is_ever_sent() -> None:
     assert sent.count(NAVIGATION_REQUEST) == 10
 
 
+def test_newer_vehicles_check_their_packets_by_crc_32() -> None:
+    packet = pro4_crc_packet(5, 0, pro4_words(-132, 1313))
+    readings, counters = run(PRO4, [(0, packet + pro4_navigation(10, 1100))], Site(declination_deg=3.9))
+    assert plain(readings[0]) == ("heading", 350.7)
+    assert (counters.frames, counters.skipped_bytes) == ({"navigation": 2}, 0)
+    for index in range(len(packet)):
+        broken = bytearray(packet)
+        broken[index] ^= 0x11
+        readings, counters = run(PRO4, [(0, bytes(broken) + packet)])
+        assert len(readings) == 2
+        assert counters.skipped_bytes == len(packet)
+    request = navigation_request(crc=True)
+    assert request == pro4_crc_packet(5, 0, b"", b"\xf5\x5f")
+    assert run(PRO4, [(0, request)])[1].frames == {"request": 1}
+    poller = Poller(PRO4.model_copy(update={"poll": True, "crc32": True}))
+    assert poller.tick(0) == request
+
+
 PRO3_PIECES = st.lists(
     st.sampled_from(
         [pro3_reply(90, 500), pro3_reply(10, 900), PRO3_REQUEST, b"\x28\x31", b"\x28", pro3_reply(1, 1)[:5]]
@@ -176,6 +194,7 @@ PRO4_PIECES = st.lists(
             pro4_navigation(-100, 1200),
             NAVIGATION_REQUEST,
             pro4_packet(0, 0, bytes(300)),
+            pro4_crc_packet(2, 0, pro4_words(50, 1300)),
             b"\xfd",
         ]
     )

@@ -15,12 +15,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.decoders import decoders_for
+from drivers.keller import read_channel
 from drivers.log import read_header, read_log
 from drivers.readings import Depth, Heading, Ping, Reading
 from drivers.records import Chunk, ClockPair, Event
 from drivers.tritech.framing import Deframer, wrap_reply
 from drivers.tritech.headdata import HeadData, encode_head_data
 from drivers.tritech.ids import MessageId
+from tests.drivers.feedframes import keller_reply
 from tools import cli
 from tools.importers import hub_csv, json_lines, v4log
 from tools.importers.capture import Captured, Losses
@@ -142,6 +144,20 @@ def test_each_port_is_known_by_its_bytes_whatever_its_name(tmp_path: Path) -> No
         ("feed2", "import:com9", ("heading",)),
     ]
     assert [each.port for each in read_log(log) if isinstance(each, Chunk)] == ["sonar", "feed", "feed2", "other"]
+
+
+def test_pressure_sensors_are_known_where_their_bytes_say_it(tmp_path: Path) -> None:
+    keller = (read_channel(250, 1) + keller_reply(1.1)) * 5
+    rows = [("com1", b"0009.996,M,0.000\r\n" * 8), ("com2", keller), ("com3", b"17.3 22.1\r\n" * 8)]
+    source = tmp_path / "x.jsonl"
+    lines = [{"t_ns": n, "port": name, "dir": "rx", "hex": data.hex()} for n, (name, data) in enumerate(rows)]
+    source.write_text("\n".join(json.dumps(line) for line in lines))
+    config = read_header(imported(source, tmp_path / "x.mcap")).config
+    assert [(feed.port, feed.driver, feed.format) for feed in config.feed] == [
+        ("import:com1", "pressure", "text"),
+        ("import:com2", "pressure", "keller"),
+    ]
+    assert (config.feed[0].column, config.feed[0].unit) == (1, "m")
 
 
 def test_operator_may_say_what_a_line_is(tmp_path: Path) -> None:

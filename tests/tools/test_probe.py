@@ -60,7 +60,10 @@ RECORDED: list[tuple[Callable[[Path], bytes], str, dict[str, object]]] = [
     (lambda _: pro3_reply(90, 500) * 9, "videoray_pro3", {"provides": ["heading"]}),
     (lambda _: pro4_navigation(900, 1100) * 4, "videoray_pro4", {"provides": ["heading", "depth"]}),
     (lambda _: (read_channel(250, 1) + keller_reply(1.1)) * 4, "pressure", {"format": "keller"}),
-    (lambda _: b"0009.996,M,0.000\r\n" * 8, "pressure", {"provides": ["depth"]}),
+    (lambda _: b"0009.996,M,0.000\r\n" * 8, "pressure", {"provides": ["depth"], "column": 1, "unit": "m"}),
+    (lambda _: b"17.3,1017.3 mbar\r\n" * 8, "pressure", {"column": 2, "unit": "mbar", "pressure": "absolute"}),
+    (lambda _: b"P: 1.73 kPa\r\n" * 8, "pressure", {"column": 2, "unit": "kpa", "pressure": "gauge"}),
+    (lambda _: b"17.3;1017.3\r\n" * 8, "pressure", {"provides": ["depth"]}),
 ]
 
 

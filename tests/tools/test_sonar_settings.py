@@ -142,6 +142,30 @@ def test_heads_with_two_frequencies(channel: str, word: int, slope: int, dual: b
 
 
 @pytest.mark.parametrize("dst", [True, False])
+def test_four_bits_to_an_echo_halve_the_time_on_the_line(dst: bool) -> None:
+    def ramp(sounding: Sounding) -> NDArray[np.uint8]:
+        return (np.arange(sounding.bins) * 255 // sounding.bins).astype(np.uint8)
+
+    sonar = Sonar(bits=4, bins=401, head_type="dst" if dst else "non-dst")
+    water = Water(sonar, HeadOptions(dst=dst))
+    water.head._listen = ramp
+    water.run(10)
+    count, start_ns = len(water.pings), water.t_ns
+    water.run(10)
+    seconds = (water.t_ns - start_ns) / (len(water.pings) - count) / 1e9
+    assert seconds <= 1.05 * ((201 + 45) * 10 / 115200 + 0.010)
+    assert water.host.limits.ruling(seconds) == "line"
+    assert not water.host.settings_differ
+    echoes = water.pings[-1].echoes.astype(int)
+    assert len(echoes) == 402
+    # What lies between least and greatest level comes back within half of one of fifteen steps.
+    wanted = np.arange(402) * 255 // 402
+    low, span = water.replies[-1].ad_low, water.replies[-1].ad_span
+    between = (wanted > low + span / 15) & (wanted < low + span)
+    assert np.abs(echoes - wanted)[between].max() <= span / 30 + 1
+
+
+@pytest.mark.parametrize("dst", [True, False])
 def test_half_duplex_is_one_request_then_its_reply(dst: bool) -> None:
     sonar = Sonar(bins=100, head_type="dst" if dst else "non-dst")
     water = Water(sonar, HeadOptions(dst=dst, replies_per_request=1)).run(20)

@@ -7,13 +7,17 @@ from typing import Final
 
 from config.schema import Feed, Quantity, Site
 from drivers.decoders import FEEDS, Decoder, feed_decoder
+from drivers.guess import guess_columns
 from drivers.readings import Altitude, Depth, Heading, Reading
+from drivers.records import Json
 from drivers.tritech.framing import Deframer, Frame
 from drivers.tritech.headdata import HeadData, decode_head_data
 from drivers.tritech.ids import MessageId
 from tools.importers.capture import Captured
 
 SONAR_DRIVER: Final = "tritech"
+_SAMPLE_BYTES: Final = 16 << 10
+"""So much of a line is kept to find out what its columns are."""
 QUANTITIES: Final[dict[type[Reading], Quantity]] = {Heading: "heading", Depth: "depth", Altitude: "altitude"}
 
 
@@ -28,22 +32,28 @@ class LineProbe:
         """Node and first ping of a sonar's head."""
         self._frame_bytes = 0
         self._deframer = Deframer(baud)
-        self._feeds = {driver: _FeedProbe(driver) for driver in FEEDS}
+        self._feeds = {driver: _FeedProbe(driver, {}) for driver in FEEDS}
+        self._keller = _FeedProbe("pressure", {"format": "keller"})
+        self._sample = bytearray()
 
     def push(self, t_ns: int, data: bytes) -> None:
         """Take bytes that the line received at ``t_ns``."""
         self.rx_bytes += len(data)
         for frame in self._deframer.push(t_ns, data):
             self._take(frame)
-        for feed in self._feeds.values():
+        for feed in (*self._feeds.values(), self._keller):
             feed.push(t_ns, data)
+        self._sample += data[: _SAMPLE_BYTES - len(self._sample)]
 
     @property
     def driver(self) -> str | None:
         """The driver that understands the line, None where none does."""
-        # Any text with numbers could be a pressure sensor's: the operator must say so.
-        guesses = ((driver, feed) for driver, feed in self._feeds.items() if driver != "pressure")
+        # Any text with numbers could be a pressure sensor's: only one that tells its unit is.
+        guesses = [(driver, feed) for driver, feed in self._feeds.items() if driver != "pressure"]
+        guesses += [("pressure", self._keller)]
         driver, feed = max(guesses, key=lambda item: item[1].score)
+        if not feed.score and self._columns is not None:
+            driver, feed = "pressure", self._feeds["pressure"]
         # Echoes may hold a sentence by chance and text never a frame, so frames of any weight decide.
         if self._frame_bytes * 5 >= self.rx_bytes > 0 or (self._frame_bytes and not feed.score):
             return SONAR_DRIVER
@@ -51,15 +61,23 @@ class LineProbe:
 
     def feed(self, name: str, driver: str, baud: int) -> Feed:
         """Return the configuration of the line as a feed: what it provides, and as strict as it allows."""
+        settings: dict[str, object] = {"name": name, "driver": driver, "port": f"import:{self.name}", "baud": baud}
         probe = self._feeds[driver]
-        settings = {"name": name, "driver": driver, "port": f"import:{self.name}", "baud": baud}
-        if probe.quantities:
+        if driver == "pressure" and self._keller.score:
+            settings["format"] = "keller"
+        elif driver == "pressure":
+            settings |= self._columns or {}
+        elif probe.quantities:
             settings |= {"provides": probe.quantities, "checksum": probe.checksum}
         return Feed.model_validate(settings)
 
     def quantities(self, driver: str) -> tuple[Quantity, ...]:
         """Return what the line provides when ``driver`` listens to it."""
         return self._feeds[driver].quantities
+
+    @property
+    def _columns(self) -> dict[str, Json] | None:
+        return guess_columns(bytes(self._sample))
 
     def _take(self, frame: Frame) -> None:
         self._frame_bytes += len(frame.data)
@@ -71,9 +89,9 @@ class LineProbe:
 class _FeedProbe:
     """One feed's driver, once asking for checksums and once not."""
 
-    def __init__(self, driver: str) -> None:
-        self._strict = _listener(driver, "require")
-        self._lenient = _listener(driver, "ignore")
+    def __init__(self, driver: str, settings: dict[str, str]) -> None:
+        self._strict = _listener(driver, "require", settings)
+        self._lenient = _listener(driver, "ignore", settings)
         self._said: dict[Decoder, set[Quantity]] = {self._strict: set(), self._lenient: set()}
         self._readings = 0
 
@@ -85,8 +103,9 @@ class _FeedProbe:
 
     @property
     def score(self) -> int:
-        """Sentences with their checksum; without any, the readings."""
-        return sum(self._strict.counters.frames.values()) or self._readings
+        """Sentences with their checksum; without any, the readings; requests alone are nobody's."""
+        counts = self._strict.counters.frames
+        return sum(count for name, count in counts.items() if name != "request") or self._readings
 
     @property
     def checksum(self) -> str:
@@ -98,9 +117,9 @@ class _FeedProbe:
         return tuple(each for each in QUANTITIES.values() if each in said)
 
 
-def _listener(driver: str, checksum: str) -> Decoder:
+def _listener(driver: str, checksum: str, settings: dict[str, str]) -> Decoder:
     everything = list(QUANTITIES.values())
-    feed = Feed.model_validate({"driver": driver, "checksum": checksum, "provides": everything})
+    feed = Feed.model_validate({"driver": driver, "checksum": checksum, "provides": everything, **settings})
     return feed_decoder(feed, Site())
 
 

@@ -109,6 +109,7 @@ def _head(node: int, data: HeadData) -> dict[str, Any]:
         "head_type": "dst" if data.device_type == 0x11 else "non-dst",
         "range_m": units.labelled_range_m(data.range_scale),
         "bins": len(data.bins) if Control.ADC_8_ON in data.control else 2 * len(data.bins),
+        "bits": 8 if Control.ADC_8_ON in data.control else 4,
         "step_deg": data.step * 360.0 / units.TURN,
         "gain_pct": round(units.gain_pct(data.gain), 2),
     }
