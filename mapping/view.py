@@ -61,7 +61,7 @@ class Field:
         odds = near + np.where(self.free, HIT_FREE, HIT_UNKNOWN)
         return np.log(odds / HIT_UNKNOWN).astype(np.float32)
 
-    def cells(self, x_m: NDArray[np.float64], y_m: NDArray[np.float64]) -> NDArray[np.int32]:
+    def cells(self, x_m: NDArray[np.floating], y_m: NDArray[np.floating]) -> NDArray[np.int32]:
         """Flat indices of places; beyond the border the border's own, where nothing is known."""
         rows, cols = self.free.shape
         col = np.clip((x_m - self.x0_m) / self.cell_m, 0, cols - 1).astype(np.int32)
