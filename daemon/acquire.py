@@ -58,6 +58,7 @@ class Acquisition:
         self._lines = _lines(job)
         self._pollers = {feed.name: Poller(feed) for feed in job.config.feed if feed.poll}
         self._told_ns = 0
+        self._saving: list[int] = []
         self._apply(job.settings)
         try:
             self._open(must=job.is_first)
@@ -76,10 +77,11 @@ class Acquisition:
             t_ns, _ = self._clock.now()
             for line in self._lines.values():
                 self._serve(line, t_ns)
-            self._send(self._lines[SONAR_PORT], self._head.tick(t_ns))
+            self._wait_on_sonar(t_ns)
             for name, poller in self._pollers.items():
                 self._send(self._lines[name], poller.tick(t_ns))
             self._recorder.tick(t_ns)
+            self._tell_saved()
             self._tell_health(t_ns)
             time.sleep(_ROUND_S / self._clock.rate)
         self._stop()
@@ -121,7 +123,13 @@ class Acquisition:
             for each in self._beams.push(chunk):
                 self._link.say(each)
             if line.name == SONAR_PORT:
-                self._send(line, self._head.push(chunk.t_ns, data))
+                self._send(line, self._head.hear(chunk.t_ns, self._beams.frames))
+
+    def _wait_on_sonar(self, t_ns: int) -> None:
+        """Let time pass for the sonar: frames that no longer come are given up, requests are due."""
+        for each in self._beams.expire(*self._clock.now()):
+            self._link.say(each)
+        self._send(self._lines[SONAR_PORT], self._head.hear(t_ns, self._beams.frames))
 
     def _send(self, line: Line, data: bytes) -> None:
         """Record what goes to the sonar, or to a feed that is polled, then send it."""
@@ -164,11 +172,22 @@ class Acquisition:
             error = self._set_sonar(fields)
         elif do == "tare":
             error = self._tare(fields)
-        elif do != "save":
+        elif do == "save":
+            self._recorder.start_sync()
+            self._saving.append(command["token"])
+            return
+        else:
             self._recorder.event(do, fields)
-        error = error or (self._recorder.sync() if do == "save" else self._recorder.flush())
-        answer: dict[str, Json] = {"token": command["token"], "error": error}
-        self._link.report(ANSWER, answer | {"fields": self._recorder.health() if do == "save" else {}})
+        self._link.report(ANSWER, {"token": command["token"], "error": error or self._recorder.flush(), "fields": {}})
+
+    def _tell_saved(self) -> None:
+        """Answer who asked for it once the disk has what was recorded: nobody waits for it, least of all the lines."""
+        if not self._saving or self._recorder.is_syncing:
+            return
+        health = self._recorder.health()
+        for token in self._saving:
+            self._link.report(ANSWER, {"token": token, "error": self._recorder.error, "fields": health})
+        self._saving.clear()
 
     def _tare(self, fields: dict[str, Any]) -> str | None:
         """Record the pressure at the surface, then use it; return why that is not possible, or None."""

@@ -9,11 +9,13 @@ from config.schema import Config, Feed
 from daemon import snapshots
 from daemon.snapshots import Snapshot
 from drivers.counters import Counters
-from drivers.decoders import decoders_for
+from drivers.decoders import SONAR_PORT, decoders_for
 from drivers.feed import FeedDecoder
 from drivers.quality import Tally
-from drivers.readings import Depth, Heading, Ping, is_usable
+from drivers.readings import Depth, Heading, Ping, Reading, is_usable
 from drivers.records import Chunk, Json
+from drivers.tritech.decoder import TritechDecoder
+from drivers.tritech.framing import Frame
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +32,8 @@ class Beams:
 
     def __init__(self, config: Config) -> None:
         self._decoders = decoders_for(config)
+        sonar = self._decoders[SONAR_PORT]
+        self._sonar = sonar if isinstance(sonar, TritechDecoder) else None
         self._feeds = {feed.name: feed for feed in config.feed}
         self._tallies = {name: Tally() for name in self._feeds}
         self._told: dict[str, tuple[int, int]] = {}
@@ -43,17 +47,30 @@ class Beams:
         decoder = self._decoders.get(chunk.port)
         if decoder is None or chunk.direction != "rx":
             return []
+        return self._take(chunk.port, chunk.utc_ns, decoder.push(chunk.t_ns, chunk.data))
+
+    def expire(self, t_ns: int, utc_ns: int) -> list[Snapshot]:
+        """Return the beams that wait behind a frame of the sonar which can no longer end in time."""
+        sonar = self._sonar
+        return [] if sonar is None else self._take(SONAR_PORT, utc_ns, sonar.expire(t_ns))
+
+    @property
+    def frames(self) -> list[Frame]:
+        """Frames of the sonar that the last ``push`` of its bytes, or ``expire``, completed: cut out once for all."""
+        return [] if self._sonar is None else self._sonar.frames
+
+    def _take(self, port: str, utc_ns: int, readings: list[Reading]) -> list[Snapshot]:
         told: list[Snapshot] = []
-        for reading in decoder.push(chunk.t_ns, chunk.data):
+        for reading in readings:
             match reading:
                 case Ping():
-                    told.append(snapshots.ping(reading, chunk.utc_ns, *self._shown(reading.t_ns)))
+                    told.append(snapshots.ping(reading, utc_ns, *self._shown(reading.t_ns)))
                 case _:
-                    self._tallies[chunk.port].take(reading)
+                    self._tallies[port].take(reading)
                     if isinstance(reading, Heading) and is_usable(reading):
-                        self._heading = reading, self._feeds[chunk.port]
+                        self._heading = reading, self._feeds[port]
                     elif isinstance(reading, Depth) and is_usable(reading):
-                        self._depth = reading, self._feeds[chunk.port]
+                        self._depth = reading, self._feeds[port]
         self.pings += len(told)
         return told
 

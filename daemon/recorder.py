@@ -34,7 +34,8 @@ class Recorder:
         self._low_mib = low_mib
         self._clock = clock
         self._tell = tell
-        self._error: str | None = None
+        self.error: str | None = None
+        """Why the disk refuses, in words; None while it takes what comes."""
         self._is_low = False
         self._free_mib = 0.0
         self._pair_ns: int | None = None
@@ -67,12 +68,17 @@ class Recorder:
     def flush(self) -> str | None:
         """Hand everything to the operating system; return why that failed, or None."""
         self._guard(self._writer.flush)
-        return self._error
+        return self.error
 
-    def sync(self) -> str | None:
-        """Bring everything to the disk; return why that failed, or None."""
-        self._guard(self._writer.sync)
-        return self._error
+    @property
+    def is_syncing(self) -> bool:
+        """Whether the disk is still at work on what was recorded."""
+        return self._writer.is_syncing
+
+    def start_sync(self) -> str | None:
+        """Have everything brought to the disk meanwhile; return why that failed so far, or None."""
+        self._guard(self._writer.start_sync)
+        return self.error
 
     def close(self) -> None:
         """End the log; raise LogError where its end could not be written."""
@@ -84,7 +90,7 @@ class Recorder:
             "file": self._writer.path.name,
             "raw_bytes": self._bytes,
             "lost_records": self._writer.lost_records,
-            "error": self._error,
+            "error": self.error,
         }
         return {"log": log, "disk_free_mib": round(self._free_mib, 1), "disk_is_low": self._is_low}
 
@@ -96,12 +102,12 @@ class Recorder:
         try:
             act()
         except LogError as error:
-            if self._error is None:
-                self._error = str(error)
-                self.event("disk", {"state": "refused", "message": self._error})
+            if self.error is None:
+                self.error = str(error)
+                self.event("disk", {"state": "refused", "message": self.error})
             return
-        if self._error is not None and self._writer.is_writing:
-            self._error = None
+        if self.error is not None and self._writer.is_writing:
+            self.error = None
             self.event("disk", {"state": "writing again", "lost_records": self._writer.lost_records})
 
     def _look_at_disk(self) -> None:

@@ -2,7 +2,7 @@
 
 Angles follow the compass everywhere in lacuna: radians, clockwise seen from above.  A direction ``a`` from north
 points to ``(sin a, cos a)`` in map axes (x east, y north).  ``t_ns`` is integer nanoseconds of one monotonic clock,
-taken where the first byte of the reading arrived.
+of the moment that the reading is of, as well as the arrival of its first byte tells it.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class HeadSettings:
 
 @dataclass(frozen=True, slots=True)
 class Ping:
-    """One beam of the sonar.
+    """One beam of the sonar; ``t_ns`` is when its sound went out.
 
     ``bearing_rad`` is clockwise from the bow in [0, 2 pi).  ``echoes`` is ``(n_bins,)`` uint8, 0 to 255 for 0 to 80 dB,
     read-only; bin ``i`` covers ranges ``i * bin_m`` to ``(i + 1) * bin_m``.

@@ -13,7 +13,7 @@ import errno
 import fcntl
 import os
 import zlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -119,6 +119,7 @@ class Segment:
         self._counts: dict[int, int] = {}
         self._indexes: list[ChunkIndex] = []
         self._metadata: list[MetadataIndex] = []
+        self._is_listed = False
         self.size = 0
         """Bytes written."""
         try:
@@ -135,7 +136,6 @@ class Segment:
             record = packed([Metadata(name=METADATA_NAME, metadata=dict(metadata))])
             self._metadata.append(MetadataIndex(offset=self.size, length=len(record), name=METADATA_NAME))
             self._put(record)
-        sync_folder(self._path.parent)
 
     def write_chunk(self, buffer: ChunkBuffer) -> None:
         """Write ``buffer`` as a chunk with its message index, in one write; ``buffer`` stays as it is."""
@@ -155,20 +155,41 @@ class Segment:
         for message in buffer.messages:
             self._counts[message.channel_id] = self._counts.get(message.channel_id, 0) + 1
 
-    def fileno(self) -> int:
-        """File descriptor of the file."""
-        return self._file.fileno()
+    def syncing(self) -> Callable[[], None]:
+        """Return what waits until all written so far is on the disk; it may run elsewhere, and after ``close``."""
+        own = os.dup(self._file.fileno())
+        is_listed, self._is_listed = self._is_listed, True
+
+        def wait() -> None:
+            try:
+                os.fdatasync(own)
+            finally:
+                os.close(own)
+            if not is_listed:
+                sync_folder(self._path.parent)
+
+        return wait
 
     def sync(self) -> None:
         """Wait until what was written is on the disk."""
-        os.fdatasync(self._file.fileno())
+        self.syncing()()
 
     def close(self) -> None:
         """Write the summary, and give the file its name once it is on the disk."""
+        self.finish()
+        self.seal()
+
+    def finish(self) -> None:
+        """Write the summary: nothing is written after it."""
         self._put(packed([DataEnd(0)]))
         self._put(self._summary())
-        os.fsync(self._file.fileno())
-        self._file.close()
+
+    def seal(self) -> None:
+        """Wait until the finished file is on the disk, then give it its name; the file is closed whatever happens."""
+        try:
+            os.fsync(self._file.fileno())
+        finally:
+            self._file.close()
         if self._path.exists():
             raise FileExistsError(errno.EEXIST, "exists", str(self._path))
         self._part.rename(self._path)

@@ -6,46 +6,38 @@ reads ports must not wait for it.
 
 from __future__ import annotations
 
-import os
+from collections import deque
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 
 
 class Syncer:
-    """Brings a file's data to the disk, one call at a time."""
+    """Does what waits for the disk, in the order in which it was asked for."""
 
     def __init__(self) -> None:
         self._pool = ThreadPoolExecutor(max_workers=1, thread_name_prefix="sync")
-        self._pending: Future[None] | None = None
+        self._pending: deque[Future[None]] = deque()
 
     @property
     def is_busy(self) -> bool:
-        """Whether a call is under way."""
-        return self._pending is not None and not self._pending.done()
+        """Whether something is under way or waits."""
+        return any(not each.done() for each in self._pending)
 
-    def start(self, descriptor: int) -> None:
-        """Begin to sync; the caller may close ``descriptor`` meanwhile."""
-        own = os.dup(descriptor)
-        try:
-            self._pending = self._pool.submit(_sync, own)
-        except RuntimeError:
-            os.close(own)
-            raise
+    def start(self, work: Callable[[], None]) -> None:
+        """Have ``work`` done; the OSError that it may raise comes out of ``check``."""
+        self._pending.append(self._pool.submit(work))
 
     def check(self) -> None:
-        """Raise the OSError of the last call if that has failed; say nothing while it is under way."""
-        if self._pending is None or self.is_busy:
-            return
-        pending, self._pending = self._pending, None
-        pending.result()
+        """Raise the OSError of the first work that has failed; say nothing of what is under way."""
+        while self._pending and self._pending[0].done():
+            self._pending.popleft().result()
+
+    def wait(self) -> None:
+        """Wait until nothing is under way; raise as ``check`` does."""
+        while self._pending:
+            self._pending.popleft().result()
 
     def close(self) -> None:
-        """Wait for the end; an error is of no interest any more."""
-        self._pending = None
+        """Wait for the end of everything, then do as ``check`` does."""
         self._pool.shutdown()
-
-
-def _sync(descriptor: int) -> None:
-    try:
-        os.fdatasync(descriptor)
-    finally:
-        os.close(descriptor)
+        self.check()

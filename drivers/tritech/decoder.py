@@ -21,11 +21,16 @@ class TritechDecoder:
 
     Angles take the head's mounting into account: ``mount_deg`` turns them, ``inverted`` mirrors them.  The length of
     a bin comes from the head's own sampling interval and the configured speed of sound.
+
+    A ping is dated when its sound went out: a head replies when it has heard the last echo, so that is when the reply
+    began to come, less the time to the last bin.  A head that is still sending the reply before may have been earlier.
     """
 
     def __init__(self, sonar: Sonar) -> None:
         self._sonar = sonar
-        self._deframer = Deframer(sonar.baud)
+        self._deframer = Deframer(sonar.baud, is_wire=sonar.port.startswith("/"))
+        self.frames: list[Frame] = []
+        """What the last call completed, for the conversation with the head (`drivers.tritech.head`)."""
         self._frames: Counter[str] = Counter()
         self._refused: Counter[str] = Counter()
 
@@ -40,11 +45,16 @@ class TritechDecoder:
         """Take bytes that arrived at ``t_ns`` and return the pings that they complete."""
         return self._pings(self._deframer.push(t_ns, data))
 
+    def expire(self, t_ns: int) -> list[Reading]:
+        """Give up a frame that can no longer end in time, and return pings found inside it."""
+        return self._pings(self._deframer.expire(t_ns))
+
     def finish(self) -> list[Reading]:
         """End the stream: return pings that hide in its unfinished frame."""
         return self._pings(self._deframer.finish())
 
     def _pings(self, frames: list[Frame]) -> list[Reading]:
+        self.frames = frames
         readings: list[Reading] = []
         for frame in frames:
             self._frames[name_of(frame.message_id)] += 1
@@ -68,11 +78,12 @@ class TritechDecoder:
         reason = _unusable(data)
         if reason is not None:
             return reason
+        echoes = echoes_of(data)
         return Ping(
-            t_ns=frame.t_ns,
+            t_ns=frame.t_ns - units.sampling_ns(len(echoes), data.ad_interval),
             bearing_rad=bow_angle_rad(data.bearing, self._sonar),
             bin_m=units.bin_m(data.ad_interval, self._sonar.sound_speed_m_s),
-            echoes=echoes_of(data),
+            echoes=echoes,
             head=self._settings(data),
         )
 

@@ -36,7 +36,7 @@ _START: Final = re.compile(rb"@(?:[0-9A-Fa-f]{4}|[0-9A-Fa-f]{0,3}\Z)")
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """One whole frame, from ``@`` to LF; ``t_ns`` is when its ``@`` arrived."""
+    """One whole frame, from ``@`` to LF; ``t_ns`` is when its ``@`` came over the line."""
 
     t_ns: int
     data: bytes
@@ -65,15 +65,21 @@ class Frame:
 class Deframer:
     """Cuts frames out of a stream of bytes, in linear time and bounded memory (one frame and the chunk pushed)."""
 
-    def __init__(self, baud: int = 115200) -> None:
-        """Expect frames at ``baud`` bits per second (ten to the byte): it only widens the time a frame may take."""
+    def __init__(self, baud: int = 115200, *, is_wire: bool = False) -> None:
+        """Expect frames at ``baud`` bits per second (ten to the byte): it widens the time a frame may take.
+
+        With ``is_wire`` it dates them too (see `drivers.wire`): what a read gives together came one after the other.
+        """
         self.skipped = 0
         self.bad: Counter[str] = Counter()
         self._byte_ns = 10_000_000_000 // baud
+        self._wire_ns = self._byte_ns if is_wire else 0
         self._buffer = bytearray()
         self._base = 0
         self._offsets: list[int] = []
         self._times: list[int] = []
+        self._before: list[int] = []
+        self._newest_ns: int | None = None
         self._need = 0
         self._deadline_ns: int | None = None
 
@@ -84,14 +90,21 @@ class Deframer:
 
     def push(self, t_ns: int, data: bytes) -> list[Frame]:
         """Take bytes that arrived at ``t_ns`` and return the frames that they complete."""
+        if not data:
+            return []
         if not self._buffer and b"@" not in data:
             # Noise on an idle line, the most frequent garbage: nothing of it needs to be held or dated.
             self.skipped += len(data)
             self._base += len(data)
+            self._newest_ns = t_ns
             return []
         if not self._times or self._times[-1] != t_ns:
             self._offsets.append(self._base + len(self._buffer))
             self._times.append(t_ns)
+            # Nothing in this chunk came before the chunk that was read before: it was not in that one.
+            began_ns = t_ns - len(data) * self._wire_ns
+            self._before.append(began_ns if self._newest_ns is None else min(self._newest_ns, t_ns))
+            self._newest_ns = t_ns
         self._buffer += data
         if len(self._buffer) < self._need and not self._is_late(t_ns):
             return []
@@ -131,7 +144,7 @@ class Deframer:
                 self.bad[reason] += 1
                 at = self._seek(at, at + 1)
             elif held >= size:
-                frames.append(Frame(self._time(at), bytes(self._buffer[at : at + size])))
+                frames.append(Frame(self._came(at), bytes(self._buffer[at : at + size])))
                 at = self._seek(at + size, at + size)
             else:
                 self._need = min(next((stage for stage in STAGES if stage > held), size), size)
@@ -174,13 +187,21 @@ class Deframer:
     def _time(self, at: int) -> int:
         return self._times[bisect_right(self._offsets, self._base + at) - 1]
 
+    def _came(self, at: int) -> int:
+        """Return when the first bit of a byte came: so long before the end of its chunk as the bytes behind it took."""
+        index = bisect_right(self._offsets, self._base + at) - 1
+        last = index + 1 == len(self._offsets)
+        end = self._base + len(self._buffer) if last else self._offsets[index + 1]
+        t_ns = self._times[index]
+        return max(self._before[index], t_ns - (end - self._base - at) * self._wire_ns) if self._wire_ns else t_ns
+
     def _drop(self, count: int) -> None:
         del self._buffer[:count]
         self._base += count
         gone = bisect_right(self._offsets, self._base) - 1 if self._buffer else len(self._offsets)
         # Seldom, because the rest of a list moves with each removal at its front.
         if gone >= _STALE or not self._buffer:
-            del self._offsets[:gone], self._times[:gone]
+            del self._offsets[:gone], self._times[:gone], self._before[:gone]
 
 
 def wrap(message_id: int, payload: bytes, source: int, destination: int, head: int) -> bytes:

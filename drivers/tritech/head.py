@@ -72,8 +72,12 @@ class Head:
 
     def push(self, t_ns: int, data: bytes) -> bytes:
         """Take bytes that arrived at ``t_ns``; return bytes to send."""
+        return self.hear(t_ns, self._deframer.push(t_ns, data))
+
+    def hear(self, t_ns: int, frames: list[Frame]) -> bytes:
+        """Take frames that somebody else has cut out of what arrived; return bytes to send.  Not mixed with `push`."""
         self._start_clock(t_ns)
-        return self._hear(t_ns, self._deframer.push(t_ns, data)) + self._act(t_ns)
+        return self._hear(t_ns, frames) + self._act(t_ns)
 
     def tick(self, t_ns: int) -> bytes:
         """Let time pass; return bytes to send."""

@@ -44,6 +44,11 @@ def bin_m(interval: int, sound_speed_m_s: float) -> float:
     return sound_speed_m_s * interval * _TICK_S / 2.0
 
 
+def sampling_ns(bins: int, interval: int) -> int:
+    """Time from the beginning of a ping to its last echo."""
+    return round(bins * interval * _TICK_S * 1e9)
+
+
 def sampling(range_m: float, bins: int, sound_speed_m_s: float) -> tuple[int, int]:
     """Interval (640 ns) and number of bins that reach ``range_m``.
 

@@ -93,7 +93,7 @@ def test_what_a_full_disk_costs_is_counted_and_told(tmp_path: Path, monkeypatch:
     told: list[Snapshot] = []
     log = recorder(tmp_path, told)
     log.chunk("sonar", "rx", b"before")
-    log.sync()
+    log.start_sync()
 
     def full(*_: object) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
@@ -102,7 +102,7 @@ def test_what_a_full_disk_costs_is_counted_and_told(tmp_path: Path, monkeypatch:
         patch.setattr(Segment, "write_chunk", full)
         for number in range(200):
             log.chunk("sonar", "rx", number.to_bytes(2, "little") * 500)
-    assert log.sync() is None
+    assert log.start_sync() is None
     lost = log.health()["log"]
     assert isinstance(lost, dict)
     log.close()

@@ -19,7 +19,7 @@ from config.errors import DataError
 from config.schema import Config, Feed
 from daemon.beams import Beams, Tare
 from daemon.pipeline import Pipeline
-from drivers.keller import initialise, read_channel, with_crc
+from drivers.keller import initialise, read_channel, read_serial, with_crc
 from drivers.log import read_log
 from drivers.records import Chunk, Event
 from tests.daemon.rig import Rig, configuration, free_ports
@@ -181,7 +181,7 @@ def test_a_polled_sensor_and_its_tare_survive_the_acquisition(rig: Rig, sensor: 
     rig.stop()
     os.close(host)
     os.close(silent)
-    assert sensor.heard == {initialise(250), read_channel(250, 1)}
+    assert sensor.heard == {initialise(250), read_serial(250), read_channel(250, 1)}
     records = list(read_log(rig.logs))
     sent = {each.data for each in records if isinstance(each, Chunk) and (each.port, each.direction) == ("depth", "tx")}
     assert sent == sensor.heard

@@ -43,7 +43,7 @@ def test_a_disk_that_refuses_is_told_once_and_recording_goes_on(
     told: list[Snapshot] = []
     log = recorder(tmp_path, told)
     log.chunk("sonar", "rx", b"before")
-    assert log.sync() is None
+    assert log.start_sync() is None
 
     def full(*_: object) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
@@ -56,7 +56,7 @@ def test_a_disk_that_refuses_is_told_once_and_recording_goes_on(
             log.tick(now_ns + t_s * 2 * 10**9)
         assert "full" in str(log.health()["log"])
     assert [each.fields["kind"] for each in told] == ["disk"]
-    log.sync()
+    log.start_sync()
     log.close()
     states = [each.fields["fields"]["state"] for each in told]  # type: ignore[index, call-overload]
     assert states == ["refused", "writing again"]

@@ -26,7 +26,7 @@ def crashed(folder: Path, session: str, cut: int = 0) -> Path:
     log = LogWriter(folder, session, config, {"lacuna": "test"})
     for record in chunks(0, 40):
         log.write(record)
-    log.flush()
+    log.sync()
     assert log._segment is not None
     log._segment.abandon()
     (part,) = folder.glob(f"{session}-*.part")
@@ -67,7 +67,7 @@ def test_a_hole_in_the_middle_is_told_once(tmp_path: Path) -> None:
     for number, record in enumerate(chunks(0, 100)):
         log.write(record)
         if number % 10 == 9:
-            log.flush()
+            log.sync()
     assert log._segment is not None
     log._segment.abandon()
     (part,) = folder.iterdir()

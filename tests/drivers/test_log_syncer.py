@@ -12,7 +12,7 @@ import pytest
 
 from config.errors import LogError
 from config.schema import Config
-from drivers.log import LogWriter, read_log
+from drivers.log import Damage, Follower, LogWriter, read_log
 from drivers.log.writer import SYNC_NS
 from drivers.records import Chunk
 
@@ -70,3 +70,52 @@ def test_a_failed_sync_is_told_and_a_new_segment_begun(tmp_path: Path, monkeypat
     assert log.is_writing
     log.close()
     assert [record.t_ns for record in read_log(tmp_path)] == [1, 5 * SYNC_NS]
+
+
+def test_the_end_of_a_segment_holds_nobody_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    may_end = threading.Event()
+    original = os.fsync
+
+    def slow(descriptor: int) -> None:
+        assert may_end.wait(10.0)
+        original(descriptor)
+
+    monkeypatch.setattr(os, "fsync", slow)
+    config = Config.model_validate({"recording": {"segment_mib": 0.01}})
+    log = LogWriter(tmp_path, "s", config, {})
+    with Follower(tmp_path, "s") as follower:
+        try:
+            for number in range(300):
+                log.write(chunk(number))
+            log.flush()
+            assert sorted(path.suffix for path in tmp_path.iterdir()) == [".part"] * 4
+            # A reader sees at once that a segment is whole, by the next one.
+            seen = [record.t_ns for _ in range(8) for record in follower.poll()]
+            assert seen == list(range(300))
+        finally:
+            may_end.set()
+        log.close()
+        assert sorted(path.suffix for path in tmp_path.iterdir()) == [".mcap"] * 4
+        assert follower.poll() == []
+        assert not follower.damage.is_any
+    damage = Damage()
+    assert [record.t_ns for record in read_log(tmp_path, damage)] == list(range(300))
+    assert not damage.is_any
+
+
+def test_a_segment_that_cannot_get_its_name_is_told_and_stays_readable(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(_: int) -> None:
+        raise OSError(errno.EIO, "Input/output error")
+
+    log = LogWriter(tmp_path, "s", Config.model_validate({"recording": {"segment_mib": 0.01}}), {})
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fsync", broken)
+        for number in range(110):
+            log.write(chunk(number))
+        wait_until_idle(log)
+    with pytest.raises(LogError, match="Input/output"):
+        log.tick(SYNC_NS)
+    log.close()
+    assert [record.t_ns for record in read_log(tmp_path)] == list(range(110))

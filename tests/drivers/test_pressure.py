@@ -152,8 +152,8 @@ def test_a_keller_sensor_is_asked_and_made_ready_again() -> None:
     assert [index for index, asked in enumerate(sent) if asked == initialise(250)] == [0, 22, 44]
     assert set(sent) == {initialise(250), read_serial(250), read_channel(250, 1)}
     whole = Poller(KELLER.model_copy(update={"poll": True, "whole_pascals": True}))
-    asked = {whole.tick(t_ms * 1_000_000) for t_ms in range(0, 10_000, 50)}
-    assert asked == {b"", initialise(250), read_serial(250), read_channel(250, 1, whole=True)}
+    polled = {whole.tick(t_ms * 1_000_000) for t_ms in range(0, 10_000, 50)}
+    assert polled == {b"", initialise(250), read_serial(250), read_channel(250, 1, whole=True)}
     assert Poller(TEXT.model_copy(update={"poll": True})).tick(0) == b""
 
 

@@ -23,13 +23,17 @@ from drivers.tritech.messages import Alive, HeadInf, encode
 PING = HeadData(3200, b"\x00\x7f\xff\n@", 53, 32, 1600, 4800, range_scale=100, gain=105, ad_span=77, ad_low=40)
 
 
+NETWORK = "socket://peer:1"
+BYTE_NS = 10_000_000_000 // 115200
+
+
 def key(reading: Reading) -> tuple[object, ...]:
     assert isinstance(reading, Ping)
     return reading.t_ns, reading.bearing_rad, reading.bin_m, reading.echoes.tobytes(), reading.head
 
 
 def decode(pieces: Sequence[tuple[int, bytes]], sonar: Sonar | None = None) -> tuple[list[Ping], Counters]:
-    decoder = TritechDecoder(sonar or Sonar())
+    decoder = TritechDecoder(sonar or Sonar(port=NETWORK))
     readings = [reading for t_ns, data in pieces for reading in decoder.push(t_ns, data)]
     readings += decoder.finish()
     return [each for each in readings if isinstance(each, Ping)], decoder.counters
@@ -37,11 +41,12 @@ def decode(pieces: Sequence[tuple[int, bytes]], sonar: Sonar | None = None) -> t
 
 def test_real_stream(shared_data: Path) -> None:
     stream = (shared_data / "sonar" / "micron_dst_stream_20171102.bin").read_bytes()
-    pings, counters = decode([(9, stream)], Sonar(sound_speed_m_s=1475.0))
+    pings, counters = decode([(9, stream)], Sonar(sound_speed_m_s=1475.0, port=NETWORK))
     assert counters == Counters({"head_data": 765}, 53, {})
     assert {ping.echoes.shape for ping in pings} == {(794,)}
     first = pings[0]
-    assert (first.t_ns, first.echoes[:4].tolist()) == (9, [0x11, 0, 0x1B, 0x39])
+    # The reply came when the sound had been to the last of 794 bins of 133 intervals, and back.
+    assert (first.t_ns, first.echoes[:4].tolist()) == (9 - 794 * 133 * 640, [0x11, 0, 0x1B, 0x39])
     assert first.echoes.dtype == np.uint8
     assert math.degrees(first.bearing_rad) == pytest.approx(360 - 4.6125)
     assert first.bin_m * 794 == pytest.approx(50.0, rel=0.005)
@@ -52,7 +57,7 @@ def test_real_stream(shared_data: Path) -> None:
     whole = [key(ping) for ping in pings]
     for size in (1, 104, 4096):
         pieces = [(9, stream[i : i + size]) for i in range(0, len(stream), size)]
-        again, same = decode(pieces, Sonar(sound_speed_m_s=1475.0))
+        again, same = decode(pieces, Sonar(sound_speed_m_s=1475.0, port=NETWORK))
         assert ([key(ping) for ping in again], same) == (whole, counters)
 
 
@@ -142,7 +147,28 @@ def test_any_pieces_give_the_same(data: st.DataObject) -> None:
         for bearing, noise in data.draw(st.lists(st.tuples(st.integers(0, 6500), st.binary(max_size=9)), max_size=5))
     )
     cuts = sorted(data.draw(st.lists(st.integers(0, len(line)), max_size=6)))
-    pieces = [(3, line[a:b]) for a, b in zip([0, *cuts], [*cuts, len(line)], strict=True)]
-    whole, counters = decode([(3, line)])
-    cut, same = decode(pieces)
-    assert ([key(ping) for ping in cut], same) == ([key(ping) for ping in whole], counters)
+    for sonar, byte_ns in ((Sonar(port=NETWORK), 0), (Sonar(), BYTE_NS)):
+        # On a wire each piece is read when its last byte has come, the bytes coming without a pause.
+        ends = zip([0, *cuts], [*cuts, len(line)], strict=True)
+        whole, counters = decode([(len(line) * byte_ns, line)], sonar)
+        for pieces in ([(b * byte_ns, line[a:b]) for a, b in ends], single(line, byte_ns)):
+            cut, same = decode(pieces, sonar)
+            assert ([key(ping) for ping in cut], same) == ([key(ping) for ping in whole], counters)
+
+
+def single(line: bytes, byte_ns: int) -> list[tuple[int, bytes]]:
+    return [((at + 1) * byte_ns, line[at : at + 1]) for at in range(len(line))]
+
+
+def test_a_ping_is_dated_when_its_sound_went_out_however_late_it_is_read() -> None:
+    reply = encode_head_data(PING)
+    sampling_ns = len(PING.bins) * PING.ad_interval * 640
+    began_ns = 10**9
+    ended_ns = began_ns + len(reply) * BYTE_NS
+    # Read in one piece when the line had been silent for 5 ms; and together with what came after it.
+    for pieces in ([(ended_ns, reply)], [(ended_ns + 3 * BYTE_NS, reply + b"xyz")], [(1, b"?"), (ended_ns, reply)]):
+        (ping,), _ = decode(pieces, Sonar())
+        assert ping.t_ns == began_ns - sampling_ns
+    # Nothing came before what was read before.
+    (ping,), _ = decode([(began_ns + 7, b"?"), (ended_ns, reply)], Sonar())
+    assert ping.t_ns == began_ns + 7 - sampling_ns

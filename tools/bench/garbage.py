@@ -104,7 +104,7 @@ def _through_port(folder: Path, data: bytes) -> float:
             received += len(piece)
             chunk = recorder.chunk(SONAR_PORT, "rx", piece)
             beams.push(chunk)
-            head.push(chunk.t_ns, piece)
+            head.hear(chunk.t_ns, beams.frames)
             recorder.tick(chunk.t_ns)
         else:
             time.sleep(0.0005)
