@@ -10,7 +10,7 @@ from pathlib import Path
 
 from config.conflict import Conflict
 from config.feed_checks import check_feed, is_udp
-from config.schema import Config, Publish
+from config.schema import Config, Publish, Sonar
 
 
 def check(config: Config) -> list[Conflict]:
@@ -20,7 +20,7 @@ def check(config: Config) -> list[Conflict]:
         *_ports(config),
         *_water(config),
         *(conflict for number, feed in enumerate(config.feed) for conflict in check_feed(f"feed[{number}]", feed)),
-        *_sector(config),
+        *check_sonar(config.sonar),
         *_thresholds(config),
         *_addresses(config.publish),
         *_keys(config.publish),
@@ -74,14 +74,15 @@ def _device(port: str) -> str:
     return os.path.realpath(port) if port.startswith("/") else port
 
 
-def _sector(config: Config) -> Iterator[Conflict]:
-    sector = config.sonar.sector_deg
+def check_sonar(sonar: Sonar) -> Iterator[Conflict]:
+    """Yield the conflicts of how a head is to be set."""
+    sector = sonar.sector_deg
     if sector is None:
         return
     left, right = sector
     if not (-360 <= left <= 360 and -360 <= right <= 360):
         yield Conflict("sonar.sector_deg", f"[{left:g}, {right:g}]", "limits from -360 to 360")
-    elif (right - left) % 360 < config.sonar.step_deg:
+    elif (right - left) % 360 < sonar.step_deg:
         yield Conflict(
             "sonar.sector_deg",
             f"[{left:g}, {right:g}]",

@@ -17,6 +17,7 @@ from typing import Any, Final
 
 from pydantic import ValidationError
 
+from config.checks import check_sonar
 from config.errors import DataError, LacunaError, PortError
 from config.schema import Sonar
 from daemon import snapshots
@@ -206,13 +207,18 @@ class Acquisition:
         except ValidationError as error:
             first = error.errors(include_url=False)[0]
             return f"the sonar cannot be set so: {'.'.join(map(str, first['loc']))}: {first['msg']}"
+        except DataError as error:
+            return f"the sonar cannot be set so: {error}"
         self._recorder.event("settings", fields)
         return None
 
     def _apply(self, fields: dict[str, Any]) -> None:
-        """Set the sonar; raise ValidationError, with nothing changed, where it cannot be set so."""
+        """Set the sonar; raise ValidationError or DataError, with nothing changed, where it cannot be set so."""
         changed = {key: value for key, value in fields.items() if key not in ("start", "stop")}
-        self._sonar = Sonar.model_validate(self._sonar.model_dump() | changed)
+        sonar = Sonar.model_validate(self._sonar.model_dump() | changed)
+        for conflict in check_sonar(sonar):
+            raise DataError(f"{conflict.key}: got {conflict.got}, expected {conflict.expected}")
+        self._sonar = sonar
         if changed:
             self._head.change(self._sonar)
         if fields.get("start"):
@@ -237,8 +243,7 @@ class Acquisition:
         sonar: dict[str, Json] = {
             "state": self._head.state,
             "pings": self._beams.pings,
-            "range_m": self._sonar.range_m,
-            "gain_pct": self._sonar.gain_pct,
+            **self._sonar.model_dump(mode="json", include={"range_m", "gain_pct", "step_deg", "sector_deg"}),
             **turning(self._head),
         }
         fields: dict[str, Json] = {"ports": {**ports}, "sonar": sonar, **self._recorder.health()}

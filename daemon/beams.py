@@ -120,7 +120,10 @@ class Beams:
             "age_s": {**ages_s},
             "stale": [what for what in feed.provides if ages_s.get(what, feed.stale_after_s) >= feed.stale_after_s],
             "quality": {str(name): count for name, count in tally.counts.items()},
+            "now": {what: {"quality": told.quality, "reason": told.reason} for what, told in tally.now.items()},
             "last_reason": tally.last_reason,
+            "field": None if decoder.field_strength is None else round(decoder.field_strength, 4),
+            "undisturbed_field": feed.field_strength,
             "surface": None if surface is None else {"mbar": round(surface.mbar, 2), "origin": surface.origin},
         }
 

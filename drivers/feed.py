@@ -44,6 +44,8 @@ class FeedDecoder:
         self._surface = surface_of(feed.surface_mbar)
         self._pressures: deque[tuple[int, float]] = deque(maxlen=200)
         self._field = GOOD
+        self.field_strength: float | None = None
+        """Strength of the magnetic field as told last, in the compass's own unit; None where none is told."""
         self._turns = JumpGate(feed.max_turn_deg_s, _TURN_SLACK_DEG, "degrees", turn=360.0)
         self._dives = JumpGate(feed.max_dive_m_s, _DIVE_SLACK_M, "m")
         self._climbs = JumpGate(feed.max_climb_m_s, _CLIMB_SLACK_M, "m")
@@ -88,6 +90,7 @@ class FeedDecoder:
                 if self._feed.variation == "sentence":
                     self._variation_deg = said.value
             case Meaning.FIELD:
+                self.field_strength = said.value
                 self._field = self._field_opinion(said.value)
             case Meaning.MAGNETIC | Meaning.TRUE:
                 return self._heading(t_ns, name, said)

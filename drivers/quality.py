@@ -88,6 +88,8 @@ class Tally:
         self.last_reason = ""
         self.newest_ns: dict[str, int] = {}
         """When the newest usable reading of each quantity was taken."""
+        self.now: dict[str, Opinion] = {}
+        """What the newest reading of each quantity is worth."""
 
     @property
     def total(self) -> int:
@@ -99,5 +101,7 @@ class Tally:
         if isinstance(reading, Heading | Depth | Altitude):
             self.counts[reading.quality] += 1
             self.last_reason = reading.reason or self.last_reason
+            quantity = type(reading).__name__.lower()
+            self.now[quantity] = Opinion(reading.quality, reading.reason)
             if reading.quality != "bad":
-                self.newest_ns[type(reading).__name__.lower()] = reading.t_ns
+                self.newest_ns[quantity] = reading.t_ns

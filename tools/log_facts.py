@@ -105,7 +105,8 @@ class Turning:
         self.changes += bool(self._key)
         self._key = key
         if len(self.settings) < _KEPT:
-            self.settings.append({"since_s": round(at_s, 3)} | _shown(ping, head))
+            # A ping is of a moment before its first bytes came, perhaps before the log.
+            self.settings.append({"since_s": round(max(0.0, at_s), 3)} | _shown(ping, head))
 
 
 _COMPARED: Final = [name for name in HeadSettings.__dataclass_fields__ if name != "clockwise"]

@@ -50,10 +50,14 @@ def test_health_says_how_far_a_feed_is_to_be_trusted() -> None:
     health = beams.health("compass", 4 * SECOND)
     assert health["quality"] == {"good": 2, "suspect": 1, "bad": 1}
     assert health["last_reason"] == "compass alarm: field high (P)"
+    assert health["now"] == {"heading": {"quality": "bad", "reason": "compass alarm: field high (P)"}}
     assert health["age_s"] == {"heading": 2.0}
     assert health["stale"] == ["heading"]
     assert health["readings_s"] == 1.0
     assert health["surface"] is None
+    assert (health["field"], health["undisturbed_field"]) == (None, None)
+    beams.push(chunk("compass", 4 * SECOND, b"$PTNTHTM,71.3,N,-0.4,N,-1.4,N,75.9,2618*03\r\n"))
+    assert beams.health("compass", 4 * SECOND)["field"] == 2618.0
     depth = beams.health("sensor", 4 * SECOND)
     assert (depth["stale"], depth["surface"]) == ([], {"mbar": 1013.25, "origin": "assumed"})
 

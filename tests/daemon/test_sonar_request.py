@@ -43,6 +43,7 @@ def test_the_sonar_is_set_while_it_scans(rig: Rig) -> None:
     assert sonar(rig)["limited_by"] in ("line", "sound", "other")
     assert rig.ask(id=4, do="sonar", gain_pct=700.0)["error"]["code"] == "invalid"
     assert "range_m" in rig.ask(id=5, do="sonar", range_m=None)["error"]["message"]
+    assert "a sector wider than" in rig.ask(id=6, do="sonar", sector_deg=[10, 10])["error"]["message"]
     rig.stop()
     records = list(read_log(rig.logs))
     kinds = [record.kind for record in records if isinstance(record, Event)]

@@ -183,7 +183,26 @@ def health(t_ns: int, sonar_state: str = "open") -> Snapshot:
         "sonar": {"state": sonar_state, "rx_bytes_s": 8120.0, "pings_s": 39.8, "last_s": 0.02, "lost": 0, "skipped": 3},
         "pilot": {"state": "open", "rx_bytes_s": 0.0, "readings_s": 0.0, "last_s": 41.0, "lost": 1, "skipped": 0},
     }
-    fields: dict[str, Any] = {"ports": ports, "map": {"lag_s": 0.4, "records": 12804}, "disk_free_mib": 21480.0}
+    ports["compass"] = {
+        "state": "open", "rx_bytes_s": 240.0, "readings_s": 9.8, "last_s": 0.1, "lost": 0, "skipped": 0,
+        "bad": {"checksum": 3}, "frames": {"PTNTHTM": 812}, "age_s": {"heading": 0.1}, "stale": [],
+        "quality": {"good": 800, "suspect": 9, "bad": 3}, "last_reason": "a jump of 40.0 degrees",
+        "now": {"heading": {"quality": "suspect", "reason": "the compass warns: field low (M)"}},
+        "field": 31.26, "undisturbed_field": 44.8, "surface": None,
+    }  # fmt: skip
+    ports["depth"] = {
+        "state": "open", "rx_bytes_s": 120.0, "readings_s": 5.0, "last_s": 0.2, "lost": 0, "skipped": 0, "bad": {},
+        "age_s": {"depth": 0.2}, "stale": [], "quality": {"good": 400}, "last_reason": "", "field": None,
+        "now": {"depth": {"quality": "good", "reason": ""}}, "undisturbed_field": None,
+        "surface": {"mbar": 1009.42, "origin": "tare"},
+    }  # fmt: skip
+    sonar: dict[str, Any] = {"state": "scanning", "range_m": 8.0, "gain_pct": 45.0, "step_deg": 1.8, "sector_deg": None}
+    fields: dict[str, Any] = {
+        "ports": ports,
+        "sonar": sonar,
+        "map": {"lag_s": 0.4, "records": 12804},
+        "disk_free_mib": 21480.0,
+    }
     return snapshots.health(t_ns, time.time_ns(), {**fields, "versions": {"lacuna": "0.1.0"}, "site": "keyhole"})
 
 

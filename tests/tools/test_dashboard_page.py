@@ -173,6 +173,49 @@ def test_ports_have_a_lamp_and_a_word(page: Page) -> None:
     expect(page.locator("#disk")).to_have_text("21.0 GiB free")
 
 
+def test_a_feed_says_how_far_it_is_to_be_trusted(page: Page) -> None:
+    compass, depth = page.locator("[data-port=compass]"), page.locator("[data-port=depth]")
+    expect(compass).to_have_attribute("data-lamp", "yellow")
+    expect(compass).to_contain_text("heading suspect")
+    expect(compass).to_contain_text("heading: the compass warns: field low (M)")
+    expect(compass).to_contain_text("so far 3 bad, 9 suspect")
+    expect(compass).to_contain_text("refused: checksum 3")
+    expect(compass).to_contain_text("field 31.26, undisturbed 44.8")
+    expect(depth).to_have_attribute("data-lamp", "green")
+    expect(depth.locator(".doubt")).to_have_count(0)
+
+
+def test_the_surface_is_shown_and_tared_only_when_confirmed(page: Page, daemon: FakeDaemon) -> None:
+    expect(page.locator("#surface")).to_have_text("1009.4 mbar, tare")
+    before = len(daemon.heard)
+    page.once("dialog", lambda dialog: dialog.dismiss())
+    page.get_by_role("button", name="Tare").click()
+    page.once("dialog", lambda dialog: dialog.accept())
+    page.get_by_role("button", name="Tare").click()
+    expect(page.locator("#answer")).to_have_text("Tare: done.")
+    assert [(each.do, each.fields) for each in daemon.heard[before:]] == [("tare", {"port": "depth"})]
+
+
+def test_step_sector_and_pause_reach_the_head(page: Page, daemon: FakeDaemon) -> None:
+    form = page.locator("#form-sonar")
+    expect(form.locator("[name=step_deg]")).to_have_attribute("placeholder", "1.8")
+    expect(form.locator("[name=left_deg]")).to_have_attribute("placeholder", "full")
+    form.locator("[name=left_deg]").fill("-45")
+    page.get_by_role("button", name="Set").click()
+    expect(page.locator("#answer")).to_contain_text("A sector has a left and a right limit")
+    form.locator("[name=right_deg]").fill("60.5")
+    form.locator("[name=step_deg]").fill("0.9")
+    page.get_by_role("button", name="Set").click()
+    expect(page.locator("#answer")).to_have_text("Sonar: done.")
+    assert daemon.heard[-1].fields == {"step_deg": 0.9, "sector_deg": [-45, 60.5]}
+    page.get_by_role("button", name="Full circle").click()
+    expect(page.locator("#answer")).to_have_text("Full circle: done.")
+    assert daemon.heard[-1].fields == {"sector_deg": None}
+    page.get_by_role("button", name="Pause").click()
+    expect(page.locator("#answer")).to_have_text("Pause: done.")
+    assert daemon.heard[-1].fields == {"stop": True}
+
+
 def test_a_lost_port_turns_red_and_events_are_told(page: Page, daemon: FakeDaemon) -> None:
     daemon.say(Snapshot("event", 1, time.time_ns(), {"kind": "port_lost", "fields": {"port": "sonar"}}))
     daemon.sonar_state = "lost"

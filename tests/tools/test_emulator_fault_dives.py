@@ -67,7 +67,7 @@ def begun_ns(dive: Dive) -> int:
     ("kind", "more", "least_gap_s", "most_gap_s"),
     [
         ("hangup", {"for_s": 3.0}, 3.0, 5.0),
-        ("stall", {"for_s": 1.5}, 1.5, 2.5),
+        ("stall", {"for_s": 1.5}, 1.4, 2.5),  # what was held up is dated one after the other, as lines carry it
         ("half_frame", {}, 0.0, 2.5),
         ("garbage", {"count": 3000}, 0.25, 2.5),
         ("drop", {"rate": 0.01, "for_s": 4.0}, 0.0, 4.0),

@@ -61,7 +61,11 @@ def test_tells_the_dive(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
     assert body["sonar"]["pings_per_s"] == pytest.approx(10.0)
     assert body["sonar"]["s_per_revolution"] == pytest.approx(2.0)
     assert body["sonar"]["limited_by"] == "other"
-    assert [(each["since_s"], each["range_m"]) for each in body["sonar"]["settings"]] == [(0.0, 10.0), (6.0, 20.0)]
+    assert [(each["since_s"], each["range_m"]) for each in body["sonar"]["settings"]] == [
+        (0.0, 10.0),
+        # The reply's first bit, 145 bytes before its end, less the time to the last of 100 bins.
+        (pytest.approx(6.0 - 145 * 10 / 115200 - 100 * 33 * 640e-9, abs=0.001), 20.0),
+    ]
     assert body["sonar"]["settings_changes"] == 1
     assert body["heading"]["count"] == 2
     assert body["heading"]["arc_deg"] == [350, 10]

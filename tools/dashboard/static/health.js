@@ -1,5 +1,7 @@
 // Ports, lag, disk and events. Fields that this page does not know are shown as they come.
 
+import { doubt, lines, surfaces } from "./feeds.js";
+
 const GOOD = new Set(["open", "ok", "live", "running", "receiving", "scanning", "up"]);
 const BAD = new Set(["lost", "closed", "error", "absent", "failed", "dead", "down"]);
 const SILENT_S = 3;
@@ -19,6 +21,8 @@ export function judge(port) {
   const state = String(port.state ?? "unknown");
   if (BAD.has(state)) return { lamp: "red", word: state };
   if (Number.isFinite(port.last_s) && port.last_s > SILENT_S) return { lamp: "yellow", word: `silent for ${duration(port.last_s)}` };
+  const word = doubt(port);
+  if (word) return { lamp: "yellow", word };
   return { lamp: GOOD.has(state) ? "green" : "yellow", word: state };
 }
 
@@ -43,8 +47,10 @@ export function phrase(name, value) {
 }
 
 export class Health {
-  constructor(find) {
+  constructor(find, onSurfaces = () => {}, onSonar = () => {}) {
     this.find = find;
+    this.onSurfaces = onSurfaces;
+    this.onSonar = onSonar;
     this.clear();
   }
 
@@ -58,6 +64,8 @@ export class Health {
   push(header) {
     const ports = Object.entries(header.ports ?? {});
     this.find("ports").replaceChildren(...ports.map(([name, port]) => portItem(name, port)));
+    this.onSurfaces(surfaces(header.ports ?? {}));
+    this.onSonar(header.sonar ?? {});
     this.headline(header);
     const facts = flatten(rest(header));
     this.find("facts").replaceChildren(...facts.flatMap(([name, value]) => [element("dt", "", name), element("dd", "", number(value))]));
@@ -92,7 +100,7 @@ function rest(header) {
 }
 
 /** What stands beside a port at all times: rates and losses. The rest is in its title and under Health. */
-const isBrief = (key) => (key.endsWith("_s") && key !== "last_s") || ["lost", "skipped", "error"].includes(key);
+const isBrief = (key) => (key.endsWith("_s") && key !== "last_s" && key !== "age_s") || ["lost", "skipped", "error"].includes(key);
 
 function portItem(name, port) {
   const { lamp, word } = judge(port);
@@ -100,9 +108,10 @@ function portItem(name, port) {
   item.dataset.lamp = lamp;
   item.dataset.port = name;
   const details = Object.entries(port).filter(([key, value]) => isBrief(key) && value !== null);
-  item.title = Object.entries(port).map(([key, value]) => phrase(key, value)).join("\n");
+  item.title = flatten(port).map(([key, value]) => `${key} ${number(value)}`).join("\n");
   item.append(element("i", "lamp"), element("span", "name", name), element("span", "word", word));
   item.append(element("span", "detail", details.map(([key, value]) => phrase(key, value)).join("  ·  ")));
+  for (const [line, isDoubt] of lines(port)) item.append(element("span", isDoubt ? "detail doubt" : "detail", line));
   return item;
 }
 

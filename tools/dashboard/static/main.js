@@ -13,8 +13,8 @@ const find = (id) => document.getElementById(id);
 const polar = new Polar(find("polar"), find("polar-readout"));
 const plan = new Plan(find("plan"), find("plan-readout"), find("outside"));
 const mesh = new MeshView(find("mesh"), find("mesh-note"));
-const health = new Health(find);
 const commands = new Commands(find);
+const health = new Health(find, (surfaces) => commands.setSurfaces(surfaces), (sonar) => commands.setSonar(sonar));
 const page = { session: null, heard: null, open: false, bridge: {}, pings: [] };
 
 const TOPICS = {
@@ -71,7 +71,6 @@ function showPing(message) {
   setNumber("bearing", degreesText(header.bearing_deg));
   setNumber("range", header.range_m.toFixed(1), "m");
   if (header.gain_pct != null) setNumber("gain", header.gain_pct.toFixed(0), "%");
-  commands.setSonar(header.range_m, header.gain_pct);
   showTurn(header);
 }
 
