@@ -45,12 +45,12 @@ def close_holes(
 ) -> list[Closed]:
     """Close the holes of ``state`` ``(rows, cols)`` up to ``longest`` cells."""
     wall = state == OCCUPIED
-    walls = _open_walls(wall, state)
+    walls = open_walls(wall, state)
     closed: list[Closed] = []
     for reach in _rounds(longest):
         fresh = _close_round(candidates(walls, state, reach), model, threshold, state, wall)
         if fresh:
-            walls = _open_walls(wall, state)
+            walls = open_walls(wall, state)
         closed += fresh
     return closed
 
@@ -60,10 +60,11 @@ def open_ends(state: NDArray[np.uint8], closed: list[Closed]) -> NDArray[np.floa
     wall = state == OCCUPIED
     for each in closed:
         wall[each.cells[:, 0], each.cells[:, 1]] = True
-    return np.array([(end.x, end.y) for end in _open_walls(wall, state).ends]).reshape(-1, 2)
+    return np.array([(end.x, end.y) for end in open_walls(wall, state).ends]).reshape(-1, 2)
 
 
-def _open_walls(wall: NDArray[np.bool_], state: NDArray[np.uint8]) -> Walls:
+def open_walls(wall: NDArray[np.bool_], state: NDArray[np.uint8]) -> Walls:
+    """Find the walls, and of their ends those that were not seen to be the end."""
     walls = find_walls(wall)
     return dataclasses.replace(walls, ends=tuple(end for end in walls.ends if not capped(end, state)))
 
