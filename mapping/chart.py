@@ -1,72 +1,133 @@
-"""A chart: what the stations of one piece saw together, and where another scan fits into it."""
+"""A chart: what the stations of one piece saw together about a place, and where another scan fits into it."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from config.schema import Map
-from mapping import grid as grids
+from mapping.grid import Canvas, gather
+from mapping.likelihood import Likelihood, Posterior
+from mapping.modes import ELSEWHERE_M
+from mapping.pieces import LEVEL_M, Pieces, sd_m
 from mapping.prior import Cloud, Prior
-from mapping.register import ELSEWHERE_M, Match, register
+from mapping.register import Match, register, search
 from mapping.sight import Sight, rise_m, shifted
-from mapping.values import Pose, Station, Way
-from mapping.view import Field, View, field_of, points_of, to_map
+from mapping.values import Pose, Way
+from mapping.view import Field, Points, View, field_of, points_of, to_map
 from mapping.way import Walk
 
-LEVEL_M = 0.5
-"""Scans whose depths differ by more see other walls: wells taper."""
+NEIGHBOURS = 6
+"""Stations, those nearest, that make a reference: with all, a scan would take longer as the dive goes on."""
+POINTS = 250
+"""Points of a reference: more would take longer, and tell no more."""
+SURE_M = 0.3
+"""Stations that lie to the one next in time less surely make no reference with it: their walls would be double."""
 TAPER = 0.5
 """Largest widening of the walls per metre of depth ..."""
 TAPER_STEPS = 4
 """... tried in so many steps to either side."""
 LEAST_PARTICLES = 200
 
-Charted = tuple[Station, Sight]
+Floats = NDArray[np.float64]
 
 
-class Chart:
-    """The stations of one piece as a reference for others."""
+class Charts:
+    """References of several stations, drawn from what is kept of them."""
 
-    def __init__(self, charted: Sequence[Charted], config: Map) -> None:
-        self._charted = charted
-        self._config = config
+    def __init__(self, pieces: Pieces, canvas: Canvas, config: Map) -> None:
+        self._pieces, self._canvas, self._config = pieces, canvas, config
 
-    def match(self, sight: Sight, prior: Prior, rng: np.random.Generator) -> Match:
-        """Register a scan in what the stations at its own level saw; without any, in what the others saw."""
-        level = self._level(sight)
-        reference = self._reference(level or self._charted, prior, sight)
-        if level:
-            return register(sight.view, reference, prior, self._config.particles, rng)
-        rise = min(rise_m(sight.scan, station.scan) for station, _ in self._charted)
+    def match(self, sight: Sight, base: int, prior: Prior, rng: np.random.Generator) -> Match:
+        """Register a scan in what stations about its prior, tied to ``base``, saw at its level; or else in others'."""
+        held = self.about(base, (prior.x_m, prior.y_m), sight)
+        reference = self.reference(held, prior, sight)
+        if rise_m(sight.scan, self._pieces.sight(held[0]).scan) <= LEVEL_M:
+            match = register(sight.view, reference, prior, self._config.particles, rng)
+            if held == [base]:
+                return match
+            alone = Likelihood(sight.view, self.reference([base], prior, sight), prior)
+            best, _ = search(alone, prior, self._config.particles, rng, np.zeros((0, 3)))
+            margin = doubted(match, best, Likelihood(sight.view, reference, prior), alone)
+            return replace(match, margin=min(match.margin, margin))
+        rise = min(rise_m(sight.scan, self._pieces.sight(k).scan) for k in held)
         tapers = np.arange(-TAPER_STEPS, TAPER_STEPS + 1) * (TAPER * rise / TAPER_STEPS)
         views = [shifted(sight, float(taper), self._config).view for taper in tapers]
         particles = max(LEAST_PARTICLES, self._config.particles // 3)
         return best_of([register(view, reference, prior, particles, rng) for view in views])
 
-    def walk(self, base: Station, ways: Sequence[Way], rng: np.random.Generator) -> Cloud | None:
+    def walk(self, base: int, ways: Sequence[Way], rng: np.random.Generator) -> Cloud | None:
         """Carry a cloud from a station along ways; None where one of them was not seen whole."""
-        near = [(s, sight) for s, sight in self._charted if rise_m(s.scan, base.scan) <= LEVEL_M]
-        walk = Walk(base.pose, base.scan.heading_rad, self._field(near), rng)
+        pose, sight = self._pieces.pose(base), self._pieces.sight(base)
+        field = self._field(self.about(base, (pose.x_m, pose.y_m), sight))
+        walk = Walk(pose, sight.scan.heading_rad, field, rng)
         return walk.cloud if all(walk.follow(way, self._config) for way in ways) else None
 
-    def _level(self, sight: Sight) -> list[Charted]:
-        return [(s, other) for s, other in self._charted if rise_m(sight.scan, s.scan) <= LEVEL_M]
+    def about(self, base: int, xy_m: tuple[float, float], sight: Sight) -> list[int]:
+        """Stations nearest to a place, of a scan's level if there are any, that lie to ``base`` surely."""
+        solution = self._pieces.solution(base)
+        level = [k for k in solution.stations if rise_m(sight.scan, self._pieces.sight(k).scan) <= LEVEL_M]
+        near = sorted(level or solution.stations, key=lambda k: (_away_m(self._pieces.pose(k), xy_m), k))
+        sure = [k for k in near if k == base or sd_m(solution.between(base, k)) <= SURE_M]
+        return (sure or near)[:NEIGHBOURS]
 
-    def _field(self, charted: Sequence[Charted]) -> Field:
-        return field_of(grids.render([(station.pose, sight.evidence) for station, sight in charted], self._config))
-
-    def _reference(self, charted: Sequence[Charted], prior: Prior, sight: Sight) -> View:
-        """Make what the stations saw, as far as the scan may have seen it, into one view."""
-        xy = np.concatenate([to_map(station.pose, other.view.points.xy_m) for station, other in charted])
-        trust = np.concatenate([other.view.points.trust for _, other in charted])
+    def reference(self, held: Sequence[int], prior: Prior, sight: Sight) -> View:
+        """Make what stations saw, as far as a scan may have seen it, into one view."""
+        views = [(self._pieces.pose(k), self._pieces.sight(k).view) for k in held]
+        xy = np.concatenate([to_map(pose, view.points.xy_m) for pose, view in views])
+        trust = np.concatenate([view.points.trust for _, view in views])
         own = sight.view.points.xy_m
         reach = prior.reach_m * (3.0 if prior.gaussian else 1.0) + float(np.hypot(own[:, 0], own[:, 1]).max()) + 1.0
         near = np.hypot(xy[:, 0] - prior.x_m, xy[:, 1] - prior.y_m) < reach
-        return View(points_of(xy[near], trust[near]), self._field(charted))
+        return View(_fewer(points_of(xy[near], trust[near])), self._field(held))
+
+    def _field(self, held: Sequence[int]) -> Field:
+        drawn = [self._canvas.cells(self._pieces.pose(k), self._pieces.sight(k).evidence) for k in held]
+        return field_of(gather(drawn, self._config))
+
+
+def _fewer(points: Points) -> Points:
+    """Let each of some points speak for several, where there are many: their weights then add up to more than 1."""
+    n = len(points.xy_m)
+    kept = np.linspace(0.0, n - 1.0, min(n, POINTS)).astype(np.intp)
+    weight = points.weight[kept] * (n / max(len(kept), 1)) / max(float(points.weight[kept].sum()), 1e-9)
+    return Points(points.xy_m[kept], points.trust[kept], weight, points.normal_rad[kept])
+
+
+class Found(Protocol):
+    """An answer of a registration: a pose, and its log-posterior."""
+
+    @property
+    def pose(self) -> Pose:
+        """The best pose."""
+
+    @property
+    def height(self) -> float:
+        """Its log-posterior."""
+
+
+def doubted(found: Found, best: Floats, whole: Posterior, alone: Posterior) -> float:
+    """Tell the margin that is left when the scan before is heard alone, where its ``best`` pose is elsewhere.
+
+    Where much is known, a scan finds its like; a place at the edge of what is known, where it truly is, has less to
+    show for itself.  The scan before knows least, and so is drawn least to where much is known.
+    """
+    pose = np.array([found.pose.x_m, found.pose.y_m, found.pose.heading_rad])
+    if math.hypot(*(best - pose)[:2]) < ELSEWHERE_M:
+        return math.inf
+    against = max(0.0, _height(alone, best) - _height(alone, pose))
+    return found.height - _height(whole, best) - against
+
+
+def _height(like: Posterior, pose: Floats) -> float:
+    """Largest log-posterior about a pose."""
+    steps = np.stack(np.meshgrid(*[np.arange(-2, 3)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    return float(like.log_posterior(pose + steps * [0.05, 0.05, math.radians(1.0)]).max())
 
 
 def best_of(matches: list[Match]) -> Match:
@@ -80,3 +141,7 @@ def best_of(matches: list[Match]) -> Match:
 def apart_m(a: Pose, b: Pose) -> float:
     """Distance of two poses."""
     return math.hypot(a.x_m - b.x_m, a.y_m - b.y_m)
+
+
+def _away_m(pose: Pose, xy_m: tuple[float, float]) -> float:
+    return math.hypot(pose.x_m - xy_m[0], pose.y_m - xy_m[1])

@@ -17,39 +17,48 @@ CLAMP_OCCUPIED = 4.6
 CLAMP_FREE = -3.5
 """Log-odds are held within these, so that a mistake can be unlearnt."""
 MARGIN_CELLS = 2
+SAME_M, SAME_RAD = 0.004, math.radians(0.1)
+"""A scan is not drawn anew for less."""
 
 Placed = tuple[Pose, PolarEvidence]
 
 
 @dataclass(frozen=True, slots=True)
 class Cells:
-    """What one scan says at its pose, cell by cell: ``row``, ``col`` ``(k,)`` int64 from the origin, each cell once.
+    """What one scan says at its pose, cell by cell: ``row``, ``col`` ``(k,)`` int32 from the origin, each cell once.
 
     ``log_odds`` ``(k,)`` float32 are not 0.
     """
 
-    row: NDArray[np.int64]
-    col: NDArray[np.int64]
+    row: NDArray[np.int32]
+    col: NDArray[np.int32]
     log_odds: NDArray[np.float32]
 
 
 class Canvas:
-    """Draws grids, and works out a scan's cells anew only where its pose changed; the grid is the same to the byte."""
+    """Draws grids, and works out a scan's cells anew only where its pose moved by more than one would see."""
 
     def __init__(self, config: Map) -> None:
         self._config = config
-        self._kept: dict[tuple[int, Pose], tuple[PolarEvidence, Cells]] = {}
+        # The evidence is kept with its cells, so that its id stays its own.
+        self._kept: dict[int, tuple[PolarEvidence, Pose, Cells]] = {}
 
     def render(self, placed: Sequence[Placed]) -> Grid:
-        """Draw scans at their poses; what is not drawn is forgotten."""
-        drawn = [self._cells(pose, evidence) for pose, evidence in placed]
-        # The evidence is kept with its cells, so that its id stays its own.
-        self._kept = {(id(e), p): (e, cells) for (p, e), cells in zip(placed, drawn, strict=True)}
-        return gather(drawn, self._config)
+        """Draw scans at their poses."""
+        return gather([self.cells(pose, evidence) for pose, evidence in placed], self._config)
 
-    def _cells(self, pose: Pose, evidence: PolarEvidence) -> Cells:
-        known = self._kept.get((id(evidence), pose))
-        return known[1] if known is not None else cells_of(pose, evidence, self._config.cell_m)
+    def cells(self, pose: Pose, evidence: PolarEvidence) -> Cells:
+        """Cells of a scan at a pose, or at the pose next to it at which they were drawn before."""
+        known = self._kept.get(id(evidence))
+        if known is None or not _same(known[1], pose):
+            known = evidence, pose, cells_of(pose, evidence, self._config.cell_m)
+            self._kept[id(evidence)] = known
+        return known[2]
+
+
+def _same(a: Pose, b: Pose) -> bool:
+    turned = (a.heading_rad - b.heading_rad + math.pi) % (2.0 * math.pi) - math.pi
+    return abs(turned) < SAME_RAD and abs(a.x_m - b.x_m) < SAME_M and abs(a.y_m - b.y_m) < SAME_M
 
 
 def empty(config: Map) -> Grid:
@@ -76,7 +85,7 @@ def cells_of(pose: Pose, evidence: PolarEvidence, cell_m: float) -> Cells:
     reached = (np.sqrt(x * x + y * y) / evidence.range_step_m).astype(np.intp)
     told = np.where(reached < table.shape[1], table[bearing, np.minimum(reached, table.shape[1] - 1)], 0.0)
     row, col = np.nonzero(told)
-    return Cells(row + south, col + west, told[row, col].astype(np.float32))
+    return Cells((row + south).astype(np.int32), (col + west).astype(np.int32), told[row, col].astype(np.float32))
 
 
 def gather(scans: Sequence[Cells], config: Map) -> Grid:

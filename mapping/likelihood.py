@@ -6,6 +6,8 @@ and the mean counts as much as the points that err independently of each other.
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,6 +25,13 @@ FEW = 0.1
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
+
+
+class Posterior(Protocol):
+    """Whatever tells the log-posterior ``(n,)`` of poses ``(n, 3)`` by walls of a given width."""
+
+    def log_posterior(self, poses: Floats, sigma_m: float = ...) -> Floats:
+        """Log-posterior, up to a constant."""
 
 
 class Likelihood:

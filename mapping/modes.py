@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mapping.likelihood import Likelihood
+from mapping.likelihood import Likelihood, Posterior
 from mapping.values import Pose
 
 ELSEWHERE_M = 0.6
@@ -49,7 +49,7 @@ def pose_of(state: Floats) -> Pose:
     return Pose(float(state[0]), float(state[1]), float(state[2]) % (2.0 * math.pi))
 
 
-def local_moments(like: Likelihood, best: Floats) -> tuple[Floats, Floats]:
+def local_moments(like: Posterior, best: Floats) -> tuple[Floats, Floats]:
     """Mean ``(3,)`` and covariance ``(3, 3)`` of the un-annealed posterior about a pose, on a lattice.
 
     The lattice widens where the posterior reaches its edge: a tunnel holds a scan across, not along.

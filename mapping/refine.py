@@ -1,129 +1,112 @@
-"""Stations together: the least squares over pairs of stations that see the same walls.
+"""Two stations that see the same walls: where the one is in the axes of the other, from wall point to wall.
 
-Each wall point of one station is drawn to the wall of another, along that wall's normal; robust weights let go of
-what only one of them saw.  Held stations give the frame; headings stay near what the registration found, because a
-round wall does not tell them.
+Each wall point of one station is drawn to the wall of the other, along that wall's normal, and the other way round;
+robust weights let go of what only one of them saw.  The two faces of a thin wall are two walls: a normal points to
+where its station stands.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import permutations
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from mapping.compass import wrap
-from mapping.register import POINTS_A_WITNESS, WITNESSES
+from mapping.graph import Tie
 from mapping.values import Pose
 from mapping.view import Points, from_map, to_map
 
-ROUNDS = 6
+ROUNDS = 5
 NEAR_M = 0.3
 """A point farther than this from a wall is not of it."""
 SIGMA_M = 0.05
+WITNESSES, POINTS_A_WITNESS = 40.0, 2.5
+"""Independent points of two whole scans at most, and how many returns share one error."""
 ROBUST_M = 0.1
 """Scale of the Cauchy weights."""
 PARALLEL = math.cos(math.radians(30.0))
-PAIR_M = 8.0
-"""Stations farther apart than this are not compared."""
 FEW_PAIRS = 15
 """Fewer common points than this hold nothing."""
 SETTLED_M = 1e-3
 LOOSE = 1.0
-"""Weight of a place, 1 / m2, that keeps the equations solvable."""
+"""Information, 1 / m2, with which a pose stays where nothing holds it."""
+CROOKED = 0.03
+"""Mean square by which normals of a straight wall err, rad2: so much of what holds across it seems to hold along."""
 FAR_M = 0.25
-"""A refinement that moves a station farther than this is no refinement."""
+"""A bond that moves a station farther than this is no bond."""
+
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
-class Member:
-    """A station in the adjustment; stations of another level see other walls, a held one does not move."""
+class Wall:
+    """The wall points of a station that have a normal: places ``(n, 2)``, normals towards the station, trust."""
 
-    pose: Pose
-    points: Points
-    heading_sd_rad: float
-    level: int
-    held: bool
-
-
-@dataclass(frozen=True, slots=True)
-class _Bond:
-    """Common points of two stations: residuals ``(m,)`` and their derivatives by both poses ``(m, 3)``."""
-
-    residual: NDArray[np.float64]
-    of_one: NDArray[np.float64]
-    of_other: NDArray[np.float64]
-    weight: NDArray[np.float64]
+    xy_m: Floats
+    normal_rad: Floats
+    trust: Floats
+    tree: cKDTree
 
 
-def refine(members: list[Member]) -> list[Pose]:
-    """Adjust the poses of all stations that are not held; unchanged where the adjustment runs away."""
-    trees = [cKDTree(m.points.xy_m) for m in members]
-    poses = [m.pose for m in members]
-    if all(m.held for m in members):
-        return poses
+def wall_of(points: Points) -> Wall:
+    """Make a station's points ready: normals as angles of axes that turn counter-clockwise, towards the station."""
+    known = np.isfinite(points.normal_rad)
+    xy, normal = points.xy_m[known], points.normal_rad[known]
+    away = xy[:, 0] * np.cos(normal) + xy[:, 1] * np.sin(normal) > 0.0
+    return Wall(xy, np.where(away, normal - math.pi, normal), points.trust[known], cKDTree(xy))
+
+
+def bond(one: tuple[int, Wall], other: tuple[int, Wall], start: Pose) -> Tie | None:
+    """Tie ``other`` to ``one``, beginning where it is thought to be in its axes; None where they share too little."""
+    pose, pull = start, LOOSE * np.eye(3)
     for _ in range(ROUNDS):
-        step = _solve(members, trees, poses)
-        poses = [
-            Pose(p.x_m + float(s[0]), p.y_m + float(s[1]), (p.heading_rad + float(s[2])) % (2.0 * math.pi))
-            for p, s in zip(poses, step, strict=True)
-        ]
-        if np.abs(step).max() < SETTLED_M:
+        common = _common(one[1], other[1], pose)
+        if common is None:
+            return None
+        off = np.array([pose.x_m - start.x_m, pose.y_m - start.y_m, pose.heading_rad - start.heading_rad])
+        step = np.linalg.solve(common[0] + pull, common[1] - pull @ off)
+        pose = Pose(pose.x_m + float(step[0]), pose.y_m + float(step[1]), pose.heading_rad + float(step[2]))
+        if float(np.abs(step).max()) < SETTLED_M:
             break
-    moved = [math.hypot(p.x_m - m.pose.x_m, p.y_m - m.pose.y_m) for p, m in zip(poses, members, strict=True)]
-    return [m.pose for m in members] if max(moved) > FAR_M else poses
-
-
-def _solve(members: list[Member], trees: Sequence[cKDTree], poses: list[Pose]) -> NDArray[np.float64]:
-    """Make one step of Gauss and Newton, ``(n, 3)``, zero for held stations."""
-    n = len(members)
-    normal, right = np.zeros((n, 3, n, 3)), np.zeros((n, 3))
-    for i, j in permutations(range(n), 2):
-        bond = _bond(members[i], poses[i], members[j], poses[j], trees[j])
-        if bond is None:
-            continue
-        for a, of_a in ((i, bond.of_one), (j, bond.of_other)):
-            right[a] -= of_a.T @ (bond.weight * bond.residual)
-            for b, of_b in ((i, bond.of_one), (j, bond.of_other)):
-                normal[a, :, b, :] += (of_a * bond.weight[:, None]).T @ of_b
-    for i, (member, pose) in enumerate(zip(members, poses, strict=True)):
-        trust = 1.0 / member.heading_sd_rad**2
-        normal[i, :, i, :] += np.diag([LOOSE, LOOSE, trust])
-        right[i, 2] -= wrap(pose.heading_rad - member.pose.heading_rad) * trust
-    free = np.flatnonzero(np.repeat([not m.held for m in members], 3))
-    step = np.zeros(3 * n)
-    step[free] = np.linalg.solve(normal.reshape(3 * n, 3 * n)[np.ix_(free, free)], right.reshape(-1)[free])
-    return step.reshape(n, 3)
-
-
-def _bond(one: Member, pose: Pose, other: Member, other_pose: Pose, tree: cKDTree) -> _Bond | None:
-    """Draw the points of one station to the walls of another."""
-    apart = math.hypot(pose.x_m - other_pose.x_m, pose.y_m - other_pose.y_m)
-    if one.level != other.level or apart > PAIR_M or (one.held and other.held):
+    common = _common(one[1], other[1], pose)
+    if common is None or math.hypot(pose.x_m - start.x_m, pose.y_m - start.y_m) > FAR_M:
         return None
-    xy = to_map(pose, one.points.xy_m)
-    distance, nearest = tree.query(from_map(other_pose, xy), distance_upper_bound=NEAR_M)
-    nearest = np.where(np.isfinite(distance), nearest, 0)
-    angle = other.points.normal_rad[nearest] - other_pose.heading_rad
-    own = one.points.normal_rad - pose.heading_rad
-    common = np.isfinite(distance) & (np.nan_to_num(np.abs(np.cos(angle - own))) > PARALLEL)
-    if int(common.sum()) < FEW_PAIRS:
+    return Tie(one[0], other[0], pose, _sober(common[0], common[2]))
+
+
+def _common(one: Wall, other: Wall, pose: Pose) -> tuple[Floats, Floats, float] | None:
+    """Make the normal equations of the pose of ``other`` by all common walls; last the weight of the points."""
+    there, here = _drawn(to_map(pose, other.xy_m), other.normal_rad - pose.heading_rad, one)
+    back, forth = _drawn(from_map(pose, one.xy_m), one.normal_rad + pose.heading_rad, other)
+    p = to_map(pose, np.concatenate([other.xy_m[there], other.xy_m[forth]]))
+    q = np.concatenate([one.xy_m[here], one.xy_m[back]])
+    if len(p) < 2 * FEW_PAIRS:
         return None
-    p, a = xy[common], angle[common]
-    n = np.stack([np.cos(a), np.sin(a)], axis=1)
-    wall = to_map(other_pose, other.points.xy_m[nearest[common]])
-    residual = ((p - wall) * n).sum(axis=1)
-    trust = one.points.trust[common] * other.points.trust[nearest[common]]
-    few = min(1.0 / POINTS_A_WITNESS, WITNESSES / max(float(trust.sum()), 1.0))
+    angle = np.concatenate([one.normal_rad[here], other.normal_rad[forth] - pose.heading_rad])
+    trust = np.concatenate([one.trust[here] * other.trust[there], one.trust[back] * other.trust[forth]])
+    n = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    residual = ((p - q) * n).sum(axis=1)
+    few = min(0.5 / POINTS_A_WITNESS, WITNESSES / max(float(trust.sum()), 1.0))
     weight = few * trust / (SIGMA_M**2 * (1.0 + (residual / ROBUST_M) ** 2))
-    return _Bond(residual, _by_pose(p, pose, n), -_by_pose(p, other_pose, n), weight)
+    dx, dy = p[:, 0] - pose.x_m, p[:, 1] - pose.y_m
+    by = np.column_stack([n, n[:, 0] * dy - n[:, 1] * dx])  # a turn clockwise moves (x, y) by (y, -x)
+    weighed = by * weight[:, None]
+    return weighed.T @ by, -weighed.T @ residual, float(weight.sum())
 
 
-def _by_pose(xy: NDArray[np.float64], pose: Pose, n: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Derive places along normals by a pose: a turn clockwise moves (x, y) by (y, -x)."""
-    dx, dy = xy[:, 0] - pose.x_m, xy[:, 1] - pose.y_m
-    return np.column_stack([n, n[:, 0] * dy - n[:, 1] * dx])
+def _drawn(xy_m: Floats, normal_rad: Floats, wall: Wall) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Points that lie on a wall, and the wall's points that they are drawn to, ``(m,)`` indices each."""
+    found = wall.tree.query(xy_m, distance_upper_bound=NEAR_M)
+    distance, nearest = np.asarray(found[0]), np.asarray(found[1], dtype=np.intp)
+    of = np.flatnonzero(np.isfinite(distance))
+    same = np.cos(wall.normal_rad[nearest[of]] - normal_rad[of]) > PARALLEL
+    return of[same], nearest[of[same]]
+
+
+def _sober(information: Floats, weight: float) -> Floats:
+    """Take away what crooked normals feign: information along a straight wall."""
+    less = information - CROOKED * weight * np.diag([1.0, 1.0, 0.0])
+    value, vector = np.linalg.eigh(0.5 * (less + less.T))
+    return np.asarray(vector @ np.diag(np.maximum(value, 0.0)) @ vector.T, dtype=np.float64)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapping.likelihood import POINTS_A_WITNESS as POINTS_A_WITNESS
-from mapping.likelihood import SIGMA_M, Likelihood
+from mapping.likelihood import SIGMA_M, Likelihood, Posterior
 from mapping.likelihood import WITNESSES as WITNESSES
 from mapping.modes import ELSEWHERE_M as ELSEWHERE_M
 from mapping.modes import Mode, local_moments, pose_of, ridge_of
@@ -105,7 +105,7 @@ def _modes(like: Likelihood, first: tuple[Pose, Floats], other: Floats, margin: 
 
 
 def search(
-    like: Likelihood, prior: Prior, particles: int, rng: np.random.Generator, barred: Floats
+    like: Posterior, prior: Prior, particles: int, rng: np.random.Generator, barred: Floats
 ) -> tuple[Floats, float]:
     """Anneal particles from the prior to the best pose ``(3,)``, not within ``ELSEWHERE_M`` of barred ones."""
     poses = prior.draw(particles, rng)

@@ -1,7 +1,8 @@
 """Stations: scans with their places, kept in order; what is known of the map so far.
 
-What cannot be tied to the map begins a piece of its own, in which scans that fit it are gathered, and which joins the
-map when one of its scans can be placed there.  Until then its poses are a guess as a whole, and no evidence.
+A scan grows the piece that it fits.  What fits none begins a piece of its own, which is joined to another when all its
+scans together say where it lies.  The largest piece is the map; the places of another are a guess as a whole, and no
+evidence.
 """
 
 from __future__ import annotations
@@ -12,177 +13,208 @@ from dataclasses import replace
 import numpy as np
 
 from config.schema import Map
-from mapping import grid as grids
-from mapping.chart import LEVEL_M, Chart, Charted, apart_m
+from mapping.chart import Charts
 from mapping.compass import wrap
-from mapping.pieces import Shift, floating, landed
+from mapping.graph import put_at, seen_from
+from mapping.grid import Canvas
+from mapping.hypotheses import ASKED, lies
+from mapping.pieces import Pieces
 from mapping.prior import Hint, Prior, agreed
-from mapping.refine import Member, refine
-from mapping.sight import Sight, rise_m
-from mapping.values import Grid, Station, Way
+from mapping.sight import Sight
+from mapping.values import Grid, Pose, Station, Way
 from mapping.verdict import judge, nowhere, origin
 
-TRIES = 6
-"""Waiting scans tried again for one new station: it must not take longer as the dive goes on."""
 FEW_POINTS = 12
 """Scans with fewer wall points cannot be placed, and no map can begin with them."""
-ADJUST, ADJUST_WITH = 6, 12
-"""So many stations nearest to a new one are adjusted with it, and so many held ones hold them."""
-MIN_HEADING_SD_RAD = math.radians(0.5)
-WAYS = 3
-"""Ways further back than this are not followed."""
+BACK = 3
+"""So many scans back a vehicle is still within reach, and its way is followed."""
+TRIES = 2
+"""Pieces tried again for one new scan: it must not take longer as the dive goes on."""
 
 
 class Stations:
-    """All scans of a dive with their places; the first that can be read is the origin."""
+    """All scans of a dive with their places; the first of the map is the origin."""
 
     def __init__(self, config: Map) -> None:
         self._config = config
-        self._canvas = grids.Canvas(config)
-        self._stations: list[Station] = []
+        self._canvas = Canvas(config)
+        self._pieces = Pieces(math.radians(config.compass_sd_deg))
+        self._charts = Charts(self._pieces, self._canvas, config)
+        self._judged: list[Station] = []
         self._sights: list[Sight] = []
         self._hints: list[Hint | None] = []
-        self._tried: dict[int, int] = {}  # a waiting scan, and how many stations were placed when it was tried last
+        self._tried: dict[tuple[int, int], tuple[int, int]] = {}
+        self._map: tuple[int, ...] = ()
+        self._told: tuple[Station, ...] = ()
 
     @property
     def all(self) -> tuple[Station, ...]:
         """Stations in the order of their scans."""
-        return tuple(self._stations)
+        return self._told
 
     def add(self, sight: Sight, hint: Hint | None) -> Station:
-        """Place a scan as well as it can be, and try the ones again that could not be placed before."""
+        """Place a scan as well as it can be, and see whether it joins pieces that lay apart."""
+        i = len(self._sights)
         self._sights.append(sight)
         self._hints.append(hint)
-        newest = len(self._stations)
-        self._stations.append(nowhere(sight.scan, self._config, "not looked at yet"))
-        self._stations[newest] = self._place(newest)
-        if self._stations[newest].status == "placed":
-            self._try_again(newest)
-            self._adjust(newest)
-        return self._stations[newest]
+        self._judged.append(self._place(i))
+        self._join()
+        self._tell()
+        return self._told[i]
 
     def drop(self, index: int) -> bool:
         """Leave the station of a scan's index out of the map; False where there is none."""
-        for i, station in enumerate(self._stations):
+        for i, station in enumerate(self._judged):
             if station.scan.index == index:
-                self._stations[i] = replace(station, status="dropped", why="left out by the pilot")
+                self._judged[i] = replace(station, status="dropped", why="left out by the pilot")
+                self._pieces.drop(i)
+                self._tell()
                 return True
         return False
 
     def grid(self) -> Grid:
-        """Draw the evidence of the placed stations."""
-        placed = self._of_piece(0)
-        return self._canvas.render([(self._stations[k].pose, self._sights[k].evidence) for k in placed])
-
-    def _of_piece(self, piece: int) -> list[int]:
-        """Stations that hold a piece together; of piece 0 those that are placed."""
-        told = [k for k, s in enumerate(self._stations) if s.piece == piece and s.status != "dropped"]
-        return [k for k in told if (piece or self._stations[k].status == "placed") and self._readable(k)]
-
-    def _readable(self, k: int) -> bool:
-        return len(self._sights[k].view.points.xy_m) >= FEW_POINTS
+        """Draw the evidence of the stations of the map."""
+        return self._canvas.render([(self._told[k].pose, self._sights[k].evidence) for k in self._map])
 
     def _place(self, i: int) -> Station:
-        scan, placed = self._sights[i].scan, self._of_piece(0)
-        if not self._readable(i):
-            points = len(self._sights[i].view.points.xy_m)
+        """Grow the piece that a scan fits, or begin one with it."""
+        sight, config = self._sights[i], self._config
+        points = len(sight.view.points.xy_m)
+        if points < FEW_POINTS:
             why = f"only {points} wall points in the scan: is there a wall within the range?"
-            return nowhere(scan, self._config, why)
-        if not placed and scan.quality == "moving":
-            return nowhere(scan, self._config, "the vehicle moved during the scan, and no map can begin with it")
-        if not placed:
-            return origin(scan, self._config)
-        station = self._fit(i, placed)
-        before = self._stations[i - 1].piece if i else 0
-        if before == 0 or not self._of_piece(before):
-            return station
-        return self._beside(i, station, before)
+            return nowhere(sight.scan, config, why)
+        bases = self._bases(i)
+        if not self._pieces.all and sight.scan.quality == "moving":
+            return nowhere(sight.scan, config, "the vehicle moved during the scan, and no map can begin with it")
+        judged = [self._fit(i, base) for base in bases]
+        for base, station in zip(bases, judged, strict=True):
+            if station.status == "placed":
+                self._pieces.grow(i, sight, base, station.pose, station.covariance)
+                return station
+        self._tried |= {(base, i): (min(len(self._pieces.of(base)), ASKED), 1) for base in bases}
+        first = judged[0] if judged else origin(sight.scan, config)
+        self._pieces.begin(i, sight, first.pose)
+        return first
 
-    def _beside(self, i: int, station: Station, piece: int) -> Station:
-        """Tie a scan to the floating piece before it as well: it grows, or, where the map is tied too, it joins."""
-        others = self._of_piece(piece)
-        tied = self._fit(i, others)
-        if tied.status != "placed":
-            return station
-        first = self._stations[others[0]].covariance
-        if station.status == "placed":
-            self._join(others, Shift.between(tied, station), first)
-            return station
-        return floating(tied, piece, first, self._stations[others[-1]].scan.index)
+    def _bases(self, i: int) -> list[int]:
+        """Name the scan before, and the one that came last of another piece, not long ago."""
+        found: list[int] = []
+        for k in range(i - 1, max(i - 1 - BACK, -1), -1):
+            if self._pieces.of(k) and not any(k in self._pieces.of(base) for base in found):
+                found.append(k)
+        return found
 
-    def _join(self, others: list[int], shift: Shift, first: np.ndarray) -> None:
-        """Bring a floating piece into the map, where a station of it has a place in both."""
-        for k in others:
-            self._stations[k] = landed(self._stations[k], shift, first)
-
-    def _try_again(self, newest: int) -> None:
-        """Try waiting scans once more that come just before or after a placed one, outward from the newest."""
-        for _ in range(TRIES):
-            placed = self._of_piece(0)
-            waiting = [i for i in range(newest) if self._stations[i].status in ("doubtful", "unplaced")]
-            chained = [i for i in waiting if {i - 1, i + 1} & set(placed) and self._tried.get(i) != len(placed)]
-            if not chained:
-                return
-            i = max(chained)
-            self._tried[i] = len(placed)
-            if not self._readable(i):
-                continue
-            again, before = self._fit(i, placed), self._stations[i]
-            if again.status == "placed":
-                others = [k for k in self._of_piece(before.piece) if k != i]
-                self._stations[i] = again
-                if others:
-                    first = self._stations[min([*others, i])].covariance if min(others) < i else before.covariance
-                    self._join(others, Shift.between(before, again), first)
-
-    def _fit(self, i: int, held: list[int]) -> Station:
-        """Find the place of a scan among the stations of one piece."""
+    def _fit(self, i: int, base: int) -> Station:
+        """Find the place of a scan in the piece of another."""
         sight = self._sights[i]
-        chart = Chart([self._charted(k) for k in held if k != i], self._config)
-        seeds = [self._config.seed, sight.scan.index]
-        prior = self._prior(i, held, chart, np.random.default_rng([*seeds, 1]))
-        match = chart.match(sight, prior, np.random.default_rng(seeds))
-        chained = any(abs(k - i) == 1 for k in held)
-        return judge(sight.scan, match, self._stations[held[0]].piece, prior, chained=chained)
+        seeds = [self._config.seed, sight.scan.index, base]
+        prior = self._prior(i, base, np.random.default_rng([*seeds, 1]))
+        match = self._charts.match(sight, base, prior, np.random.default_rng(seeds))
+        piece = 0 if base in self._map else self._sights[base].scan.index + 1
+        return judge(sight.scan, match, piece, prior, chained=abs(base - i) == 1)
 
-    def _charted(self, k: int) -> Charted:
-        return self._stations[k], self._sights[k]
-
-    def _prior(self, i: int, held: list[int], chart: Chart, rng: np.random.Generator) -> Prior:
-        """Say where a scan may have been made: within reach of the station nearest to it in time, or in a cloud."""
-        near = min((k for k in held if k != i), key=lambda k: (abs(k - i), k > i))
-        base, steps = self._stations[near], abs(near - i)
-        turned = [wrap(s.pose.heading_rad - s.scan.heading_rad) for s in (self._stations[k] for k in held)]
-        heading = self._sights[i].scan.heading_rad + float(np.mean(turned))
+    def _prior(self, i: int, base: int, rng: np.random.Generator) -> Prior:
+        """Say where a scan may have been made: within reach of another, or in a cloud."""
+        at, steps = self._pieces.pose(base), abs(base - i)
+        heading = self._sights[i].scan.heading_rad + self._turned(base)
         sd = math.radians(self._config.compass_sd_deg)
-        hint = self._hints[i]
-        if hint is not None and steps == 1 and near < i:
-            prior = hint.prior(base.pose.x_m, base.pose.y_m, heading, sd)
+        hint = self._hint(base, i)
+        if hint is not None:
+            prior = hint.prior(at.x_m, at.y_m, heading, sd)
         else:
-            prior = Prior(base.pose.x_m, base.pose.y_m, self._config.reach_m * min(steps, 3), heading, sd)
-        ways = self._ways(near, i)
-        return agreed(prior, chart.walk(base, ways, rng) if ways else None)
+            prior = Prior(at.x_m, at.y_m, self._config.reach_m * min(steps, BACK), heading, sd)
+        ways = self._ways(base, i)
+        return agreed(prior, self._charts.walk(base, ways, rng) if ways else None)
 
-    def _ways(self, near: int, i: int) -> list[Way]:
+    def _turned(self, k: int) -> float:
+        """How far the axes of a piece are turned against what the compass said in it."""
+        piece = self._pieces.of(k)
+        off = [self._pieces.pose(j).heading_rad - self._sights[j].scan.heading_rad for j in piece]
+        near = [wrap(each - off[0]) for each in off]
+        return off[0] + float(np.median(near))
+
+    def _hint(self, base: int, i: int) -> Hint | None:
+        """Join what the pilot said of the whole way from one scan to another, turned round where that came later."""
+        told = self._hints[min(base, i) + 1 : max(base, i) + 1]
+        hints = [hint for hint in told if hint is not None]
+        if not hints or len(hints) < len(told):
+            return None
+        whole = hints[0]
+        for hint in hints[1:]:
+            whole = whole.then(hint)
+        return whole if base < i else Hint(-whole.dx_m, -whole.dy_m, whole.sd_m)
+
+    def _ways(self, base: int, i: int) -> list[Way]:
         """Ways from a station to another, turned round where it came later; none where one was not seen."""
-        between = [self._sights[k].scan.way for k in range(min(near, i) + 1, max(near, i) + 1)]
+        between = [self._sights[k].scan.way for k in range(min(base, i) + 1, max(base, i) + 1)]
         seen = [way for way in between if way is not None]
-        if len(seen) < len(between) or len(seen) > WAYS:
+        if len(seen) < len(between) or len(seen) > BACK:
             return []
-        return seen if near < i else [way.back() for way in reversed(seen)]
+        return seen if base < i else [way.back() for way in reversed(seen)]
 
-    def _adjust(self, newest: int) -> None:
-        """Adjust the newest station and its neighbours together; those farther away and the origin stay."""
-        centre = self._stations[newest].pose
-        placed = self._of_piece(0)
-        near = sorted(placed, key=lambda k: (apart_m(self._stations[k].pose, centre), k))[:ADJUST_WITH]
-        held = {placed[0], *near[ADJUST:]}
-        members = [self._member(k, placed, k in held) for k in near]
-        for k, pose in zip(near, refine(members), strict=True):
-            self._stations[k] = replace(self._stations[k], pose=pose)
+    def _join(self) -> None:
+        """Join pieces that follow each other in time, where their scans together say how they lie."""
+        for _ in range(TRIES):
+            pair = self._apart()
+            if pair is None:
+                return
+            self._tried[pair] = self._sizes(pair)
+            base, lead = pair if len(self._pieces.of(pair[0])) >= len(self._pieces.of(pair[1])) else pair[::-1]
+            if len(self._pieces.of(lead)) == 1:
+                tied = self._fit(lead, base)
+                if tied.status == "placed":
+                    self._pieces.close(base, lead, tied.pose, tied.covariance)
+                continue
+            seeds = [self._config.seed, *pair, *self._sizes(pair)]
+            prior = self._prior(lead, base, np.random.default_rng([*seeds, 1]))
+            rng = np.random.default_rng(seeds)
+            fit = lies(self._pieces, self._charts, (base, lead), prior, self._config.particles // 2, rng)
+            if fit.is_sure:
+                self._pieces.close(base, lead, fit.pose, fit.covariance)
 
-    def _member(self, k: int, placed: list[int], held: bool) -> Member:
-        station = self._stations[k]
-        level = next(j for j in placed if rise_m(station.scan, self._stations[j].scan) <= LEVEL_M)
-        sd = max(math.sqrt(float(station.covariance[2, 2])), MIN_HEADING_SD_RAD)
-        return Member(station.pose, self._sights[k].view.points, sd, level, held)
+    def _apart(self) -> tuple[int, int] | None:
+        """Find the last two scans that follow each other in two pieces which have grown since they were tried."""
+        held = [i for i in range(len(self._sights)) if self._pieces.of(i)]
+        for one, other in zip(held[-2::-1], held[:0:-1], strict=True):
+            if other - one > BACK or other in self._pieces.of(one):
+                continue
+            if max(self._sizes((one, other))) > 1 and self._tried.get((one, other)) != self._sizes((one, other)):
+                return one, other
+        return None
+
+    def _sizes(self, pair: tuple[int, int]) -> tuple[int, int]:
+        one, other = (min(len(self._pieces.of(k)), ASKED) for k in pair)
+        return one, other
+
+    def _tell(self) -> None:
+        """Tell all stations: the largest piece is the map, and the first of its stations the origin."""
+        held = set(self._map)
+        self._map = max(self._pieces.all, key=lambda p: (len(p), len(held & set(p)), -p[0]), default=())
+        told = dict(enumerate(self._judged))
+        for piece in self._pieces.all:
+            told.update(self._of_piece(piece))
+        self._told = tuple(told[k] for k in range(len(self._judged)))
+
+    def _of_piece(self, piece: tuple[int, ...]) -> dict[int, Station]:
+        """Tell the stations of a piece; one that is not the map lies, as a guess, where its first may have been."""
+        first, solution = self._pieces.pose(piece[0]), self._pieces.solution(piece[0])
+        number = 0 if piece == self._map else self._sights[piece[0]].scan.index + 1
+        if number and len(piece) == 1:
+            alone = self._judged[piece[0]]
+            return {
+                piece[0]: replace(alone, status="doubtful" if alone.status == "placed" else alone.status, piece=number)
+            }
+        moved = Pose(0.0, 0.0, first.heading_rad)
+        told = {}
+        for k in piece:
+            station, pose = self._judged[k], put_at(moved, seen_from(first, self._pieces.pose(k)))
+            station = replace(station, pose=pose, covariance=solution.of(k), piece=number)
+            if k == piece[0]:
+                station = replace(station, covariance=origin(station.scan, self._config).covariance)
+            if number:
+                why = f"fits its piece of {len(piece)} scans, which nothing ties to the map yet; go back to the map"
+                station = replace(station, status="unplaced", why=why)
+            else:
+                station = replace(station, status="placed")
+            told[k] = station
+        return told

@@ -8,10 +8,9 @@ import pytest
 
 from config.schema import Map
 from mapping.echoes import pick
-from mapping.pieces import Shift, floating, landed
 from mapping.prior import Cloud, Hint, Prior, agreed
 from mapping.sight import sight_of
-from mapping.values import Pose, Scan, Station
+from mapping.values import Pose, Scan
 from mapping.way import Walk
 from tests.mapping.rooms import KEYHOLE, TUNNEL, Stay, pings
 from tests.mapping.test_scan_builder import build
@@ -113,19 +112,3 @@ def test_a_prior_with_a_cloud_still_owns_to_the_disc() -> None:
     assert there > -10.0 > beyond
     drawn = prior.draw(1000, np.random.default_rng(1))
     assert 0.4 < np.mean(np.hypot(drawn[:, 0] - 1.0, drawn[:, 1]) < 0.6) < 0.7
-
-
-def test_a_piece_lands_as_it_is(keyhole: tuple[Scan, Scan]) -> None:
-    """The stations of a piece keep their places to each other when one of them is placed in the map."""
-    first = np.diag([9.0, 9.0, 1.0])
-    own = np.diag([0.01, 0.01, 0.001])
-    one = Station(keyhole[0], Pose(1.0, 0.0, 0.1), first, "unplaced", 5, 0.0, "")
-    two = floating(Station(keyhole[1], Pose(1.0, 2.0, 0.2), own, "placed", 5, 9.0, ""), 5, first, 0)
-    assert (two.status, two.piece) == ("unplaced", 5)
-    here = replace(one, pose=Pose(4.0, 4.0, 0.1 + math.pi / 2.0), covariance=own, status="placed", piece=0)
-    there = landed(two, Shift.between(one, here), first)
-    assert (there.status, there.piece) == ("placed", 0)
-    assert (there.pose.x_m, there.pose.y_m) == pytest.approx((6.0, 4.0))
-    assert there.pose.heading_rad == pytest.approx(0.2 + math.pi / 2.0)
-    assert there.covariance[1, 1] == pytest.approx(0.02 + 4.0 * 0.001)
-    assert np.linalg.eigvalsh(there.covariance).min() > 0.0

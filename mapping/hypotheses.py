@@ -1,0 +1,122 @@
+"""Where does a piece lie in another?  All its scans asked together, for what one scan leaves open another settles.
+
+A piece is rigid to itself, so one pose of one of its scans places them all, and their likelihoods multiply.  Scans of
+one piece see many of the same walls and err alike, so that together they count for more than one, but for less than
+their number.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapping.chart import Charts, doubted
+from mapping.graph import put_at, seen_from
+from mapping.likelihood import SIGMA_M, Likelihood
+from mapping.modes import local_moments, pose_of
+from mapping.pieces import Pieces, sd_m
+from mapping.prior import Prior
+from mapping.register import overlap, search
+from mapping.values import Pose
+from mapping.view import View
+
+ASKED = 4
+"""Scans of a piece that are asked where it lies, those nearest in time to the other piece."""
+ACCEPT_MARGIN = 12.0
+"""Log-posterior above the best pose elsewhere from which a piece is joined to another ..."""
+ACCEPT_SD_M = 0.3
+"""... if it is so sure in every direction ..."""
+WITNESSES = 2
+"""... and so many of its scans, each for itself, lie on known walls."""
+ACCEPT_OVERLAP, ACCEPT_FIT = 0.35, 0.68
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """Where the leading scan of a piece lies in another piece: ``covariance`` ``(3, 3)`` over x_m, y_m, heading_rad.
+
+    ``height`` is the log-posterior, ``margin`` the same above the best pose elsewhere; ``witnesses`` of its scans lie
+    on known walls.
+    """
+
+    pose: Pose
+    covariance: Floats
+    height: float
+    margin: float
+    witnesses: int
+
+    @property
+    def is_sure(self) -> bool:
+        """Tell whether the pieces may be joined."""
+        return self.margin >= ACCEPT_MARGIN and self.witnesses >= WITNESSES and sd_m(self.covariance) <= ACCEPT_SD_M
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """A scan of the piece: its pose as the leading one sees it, its view, what it is held against."""
+
+    seen: Pose
+    view: View
+    reference: View
+    like: Likelihood
+
+
+class Together:
+    """Log-posterior of poses of the leading scan, by all scans that are asked."""
+
+    def __init__(self, asked: Sequence[_Asked], prior: Prior) -> None:
+        self._asked, self._prior = asked, prior
+        self._power = 1.0 / math.sqrt(len(asked))
+
+    def log_posterior(self, poses: Floats, sigma_m: float = SIGMA_M) -> Floats:
+        """Log-posterior ``(n,)`` of poses ``(n, 3)``, up to a constant."""
+        told = [each.like.witnesses * each.like.score(_carried(poses, each.seen), sigma_m) for each in self._asked]
+        return np.asarray(self._power * np.sum(told, axis=0) + self._prior.log_density(poses), dtype=np.float64)
+
+
+def lies(
+    pieces: Pieces, charts: Charts, pair: tuple[int, int], prior: Prior, particles: int, rng: np.random.Generator
+) -> Fit:
+    """Find where the second scan's piece lies in the first's; ``prior`` is of the second scan."""
+    base, lead = pair
+    order = sorted(pieces.of(lead), key=lambda k: (abs(k - lead), k))[:ASKED]
+    asked = [_ask(pieces, charts, base, lead, k, prior) for k in order]
+    like = Together(asked, prior)
+    best, height = search(like, prior, particles, rng, np.zeros((0, 3)))
+    other, other_height = search(like, prior, particles, rng, best[None, :])
+    if other_height > height:
+        best, height, other_height = other, other_height, height
+    mean, covariance = local_moments(like, best)
+    found = Fit(pose_of(mean), covariance, height, height - other_height, sum(_is_witness(e, best) for e in asked))
+    sight = pieces.sight(lead)
+    alone = Likelihood(sight.view, charts.reference([base], prior, sight), prior)
+    first, _ = search(alone, prior, particles, rng, np.zeros((0, 3)))
+    return replace(found, margin=min(found.margin, doubted(found, first, like, alone)))
+
+
+def _ask(pieces: Pieces, charts: Charts, base: int, lead: int, k: int, prior: Prior) -> _Asked:
+    seen, sight = seen_from(pieces.pose(lead), pieces.pose(k)), pieces.sight(k)
+    there = put_at(Pose(prior.x_m, prior.y_m, prior.heading_rad), seen)
+    about = replace(prior, x_m=there.x_m, y_m=there.y_m)
+    reference = charts.reference(charts.about(base, (there.x_m, there.y_m), sight), about, sight)
+    return _Asked(seen, sight.view, reference, Likelihood(sight.view, reference, about))
+
+
+def _is_witness(each: _Asked, pose: Floats) -> bool:
+    carried = _carried(pose[None, :], each.seen)
+    fits = float(each.like.score(carried)[0]) >= ACCEPT_FIT
+    return fits and overlap(each.view, each.reference, carried[0]) >= ACCEPT_OVERLAP
+
+
+def _carried(poses: Floats, seen: Pose) -> Floats:
+    """Poses ``(n, 3)`` of a scan that lies so to the leading one."""
+    c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+    x = poses[:, 0] + c * seen.x_m + s * seen.y_m
+    y = poses[:, 1] - s * seen.x_m + c * seen.y_m
+    return np.column_stack([x, y, poses[:, 2] + seen.heading_rad])
