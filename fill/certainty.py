@@ -1,87 +1,119 @@
-"""How sure a fill is: logistic models with a prior from elsewhere, taught by the site's own walls.
+"""How sure a fill is: logistic models learnt on other places, set right by the site's own walls.
 
-The paper tabulates hits by distance and runs a cubic through them (section 3.1.2), which leaves 0 to 1 beyond its
-last bin.  Here two logistic models, one for a hole as a whole and one for its cells, start from weights learnt on
-other places and move as far as the site's own knocked-out holes can pull them.
+The paper tabulates hits by distance and runs a cubic through them (section 3.1.2), which leaves 0 to 1 beyond its last
+bin.  Here a cell's certainty hangs on what speaks for it and for its hole (``witness``), with weights learnt on other
+places (``prior``).  What the site's own knocked-out holes teach moves a level and a slope on top of that, no further
+than sites were found to differ.  Nothing is told beyond what was learnt: features are held at the edges of their
+learnt range, and a gap longer than any learnt is told less sure the longer it is, and marked.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-_STEPS: Final = 8
-_LOWEST: Final = 0.02
-_HIGHEST: Final = 0.98
+from fill.logistic import Logistic, sigmoid
+from fill.witness import CELL_FEATURES, HOLE_FEATURES
+
+LOWEST: Final = 0.02
+HIGHEST: Final = 0.995
+"""Nothing guessed is told as sure."""
+_WIDER: Final = 16.0  # variance that a gap e times as long as any learnt adds to the log-odds
+_LOG_GAP: Final = HOLE_FEATURES.index("log gap")
+_LOG_ODDS: Final = HOLE_FEATURES.index("log-odds")
+_LOG_AWAY: Final = CELL_FEATURES.index("log away")
+
+DESIGN: Final = (
+    *HOLE_FEATURES,
+    *CELL_FEATURES,
+    *(f"{name} x log-odds" for name in CELL_FEATURES),
+    *(f"{name} x log away" for name in CELL_FEATURES),
+)
+"""What the model of cells weighs, in this order."""
 
 
 @dataclass(frozen=True, slots=True)
-class Logistic:
-    """A logistic model: ``weights`` ``(k,)`` and the ``precision`` ``(k, k)`` with which they are known."""
+class Learnt:
+    """Weights ``(k,)`` of ``DESIGN``, and the range ``low`` to ``high`` ``(k,)`` in which each was learnt."""
 
     weights: NDArray[np.float64]
-    precision: NDArray[np.float64]
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
 
-    def chance(self, features: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Probability ``(n,)`` for features ``(n, k)``."""
-        return sigmoid(features @ self.weights)
+    def log_odds(self, hole: NDArray[np.float64], cells: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Log-odds ``(n,)`` that the cells of a fill are right."""
+        design = np.clip(design_of(hole, cells), self.low, self.high)
+        return np.asarray(np.sum(design * self.weights, axis=1) * self.damped(hole), np.float64)
 
-    def taught(self, features: NDArray[np.float64], right: NDArray[np.float64], count: NDArray[np.float64]) -> Logistic:
-        """Return the model after outcomes ``right`` ``(n,)`` of 0 or 1 were seen, each counting as ``count`` ``(n,)``.
+    def excess(self, hole: NDArray[np.float64]) -> float:
+        """Logarithm of how many times longer than any learnt the gap is; 0 within what was learnt."""
+        return max(0.0, float(hole[_LOG_GAP] - self.high[_LOG_GAP]))
 
-        Maximum a posteriori, by Newton's method.
-        """
-        weights = self.weights
-        curvature = self.precision
-        for _ in range(_STEPS):
-            chance = sigmoid(features @ weights)
-            slope = features.T @ (count * (right - chance)) - self.precision @ (weights - self.weights)
-            curvature = self.precision + (features * (count * chance * (1.0 - chance))[:, None]).T @ features
-            weights = weights + np.linalg.solve(curvature, slope)
-        return Logistic(weights, curvature)
+    def damped(self, hole: NDArray[np.float64]) -> float:
+        """Return the share of the log-odds that is left where the gap is longer than any learnt."""
+        return 1.0 / math.sqrt(1.0 + math.pi / 8.0 * _WIDER * self.excess(hole) ** 2)
 
 
 @dataclass(frozen=True, slots=True)
 class Belief:
-    """What is believed about fills: ``hole`` judges candidates, ``cell`` the cells of a hole by their distance."""
+    """What is believed about fills.
+
+    ``hole`` judges candidates, so that ends can be matched; ``cell`` the cells of what was closed; ``site`` moves the
+    log-odds of cells by a level and a slope; ``whole`` tells from the cells whether a fill is right as a whole.
+    """
 
     hole: Logistic
-    cell: Logistic
+    cell: Learnt
+    site: Logistic
+    whole: NDArray[np.float64]
 
-    def certainty(self, chance: float, away: NDArray[np.float64]) -> NDArray[np.float32]:
-        """Certainty ``(n,)`` of the cells of a hole of this ``chance``, ``away`` ``(n,)`` cells from the nearer end.
+    def certainty(self, log_odds: NDArray[np.float64], away: NDArray[np.float64]) -> NDArray[np.float32]:
+        """Certainty ``(n,)`` of a fill's cells, ``away`` ``(n,)`` cells from what was measured; never growing."""
+        chance = np.clip(sigmoid(self.site.weights[0] + self.site.weights[1] * log_odds), LOWEST, HIGHEST)
+        return falling(chance, away).astype(np.float32)
 
-        It never grows with distance, and stays within 2 and 98 per cent: nothing guessed is told as sure.
-        """
-        chances = self.cell.chance(cell_features(np.full(len(away), chance), away))
-        return np.clip(chances, _LOWEST, _HIGHEST).astype(np.float32)
-
-
-def falling(
-    cell: Logistic, features: NDArray[np.float64], right: NDArray[np.float64], count: NDArray[np.float64]
-) -> Logistic:
-    """Return the model of cells after these outcomes; should they say that distance helps, distance does not count."""
-    taught = cell.taught(features, right, count)
-    if taught.weights[2] <= 0.0:
-        return taught
-    level = Logistic(cell.weights[:2], cell.precision[:2, :2]).taught(features[:, :2], right, count)
-    return Logistic(np.append(level.weights, 0.0), taught.precision)
+    def hole_certainty(self, certainty: NDArray[np.float32]) -> float:
+        """Certainty that a whole fill is right, from that of its cells ``(n,)``."""
+        return float(np.clip(sigmoid(whole_features([certainty]) @ self.whole)[0], LOWEST, HIGHEST))
 
 
-def cell_features(chance: NDArray[np.float64], away: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Features ``(n, 3)`` of filled cells: one, log-odds of the hole, log of the distance to the nearer end."""
-    clipped = np.clip(chance, 1e-3, 1.0 - 1e-3)
-    return np.stack([np.ones_like(away), np.log(clipped / (1.0 - clipped)), np.log1p(away)], axis=1)
+def design_of(hole: NDArray[np.float64], cells: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Features ``(n, k)`` after ``DESIGN`` of the cells of one fill."""
+    return np.concatenate(
+        [np.repeat(hole[None], len(cells), axis=0), cells, cells * hole[_LOG_ODDS], cells * cells[:, _LOG_AWAY, None]],
+        axis=1,
+    )
 
 
-def sigmoid(x: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Logistic function, safe for any size of ``x``."""
-    return 0.5 * (1.0 + np.tanh(0.5 * x))
+def falling(chance: NDArray[np.float64], away: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the nearest values to ``chance`` ``(n,)`` that do not grow with ``away`` ``(n,)``: means of neighbours."""
+    order = np.lexsort((-chance, away))
+    totals: list[float] = []
+    counts: list[int] = []
+    for value in chance[order].tolist():
+        total, count = value, 1
+        while totals and totals[-1] * count <= total * counts[-1]:
+            total, count = total + totals.pop(), count + counts.pop()
+        totals.append(total)
+        counts.append(count)
+    fallen = np.empty(len(chance))
+    fallen[order] = np.repeat([total / count for total, count in zip(totals, counts, strict=True)], counts)
+    return fallen
 
 
-def hole_certainty(chance: float) -> float:
-    """Certainty that a whole fill is right, within 2 and 98 per cent."""
-    return min(max(chance, _LOWEST), _HIGHEST)
+def whole_features(certainties: Sequence[NDArray[np.float32]]) -> NDArray[np.float64]:
+    """Features ``(m, 4)`` of whole fills: one, log-odds of the least sure cell and of the mean, log of their number."""
+    rows = [(float(each.min()), float(each.mean(dtype=np.float64)), float(len(each))) for each in certainties]
+    least, mean, count = np.array(rows).reshape(-1, 3).T
+    return np.stack([np.ones_like(least), log_odds(least), log_odds(mean), np.log(count)], axis=1)
+
+
+def log_odds(chance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the log-odds of probabilities, held within what is told."""
+    held = np.clip(chance, LOWEST, HIGHEST)
+    return np.asarray(np.log(held / (1.0 - held)), np.float64)

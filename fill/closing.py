@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from fill.candidates import Candidate
-from fill.certainty import Logistic
 from fill.freedom import capped
+from fill.logistic import Logistic
 from fill.matching import assign, candidates, gain
 from fill.segments import EIGHT, Walls, find_walls
 from mapping.values import OCCUPIED, UNKNOWN

@@ -1,7 +1,10 @@
-"""Lessons from the site itself: holes knocked into its own walls, and water blanked in its own openings.
+"""Exams: a hole knocked into one of the site's own walls, or the water of one of its own openings blanked.
 
-The paper (section 3.1.1) knocks out the middles of the best walls and tells its filler where they are.  Here nobody
-is told: a knocked-out grid goes through the whole pipeline, and what comes back is compared with what had stood there.
+The paper (section 3.1.1) knocks out the middles of the best walls and tells its filler where they are.  Here nobody is
+told: what is left goes through the whole pipeline, and what comes back is compared with what had stood there.
+
+Where exams are held hangs on the numbers of the cells alone, and each is held in a window of its own: a change of the
+map touches only the exams in whose windows it lies, and the others need not be held again.
 """
 
 from __future__ import annotations
@@ -16,13 +19,17 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from fill.freedom import at
-from fill.segments import EIGHT, STEPS, End, Walls
+from fill.segments import EIGHT, STEPS, End, Walls, find_walls
 from mapping.values import FREE, OCCUPIED, UNKNOWN
 
-_SHORTEST: Final = 3.0
+SIZES: Final = (4, 7, 12, 20, 30)
+"""Cells of wall that are knocked out."""
+EXAMS: Final = 12
+_ABOUT: Final = 26  # cells of the map about a hole that are looked at
 _STUB: Final = 6  # cells of wall that stay on either side of a hole
-_APART: Final = 10  # cells between two lessons on one grid
-_TRIES: Final = 12  # starts looked at for each hole wanted
+_TRIED: Final = 60  # cells of wall looked at for places
+_APART: Final = 24  # cells between two exams
+_OPENINGS: Final = 4  # one exam in so many is of an opening, where there is one
 _NARROWEST: Final = 4.0  # cells: less is no opening
 _FACING: Final = 0.8  # cosine: ends that look at each other across open water
 
@@ -30,39 +37,68 @@ Cell = tuple[int, int]
 
 
 @dataclass(frozen=True, slots=True)
-class Exam:
-    """A grid with ``holes`` pieces taken out.
+class Place:
+    """Where an exam is held: the first cell of its window, the hole's middle within that, its size, and a number."""
 
-    ``state`` is what the filler will see, ``zone`` the cells about the pieces, ``wall`` the wall taken out and
-    ``water`` the water of true openings, each with a margin of two cells.
+    row: int
+    col: int
+    middle: Cell
+    size: int
+    number: int
+
+
+@dataclass(frozen=True, slots=True)
+class Exam:
+    """A window with a piece taken out.
+
+    ``state`` is what the filler will see, ``zone`` the cells about the piece; ``opening`` whether it is the water of a
+    true opening, not wall, that was taken; ``gone`` the cells taken, with a margin of two.
     """
 
     state: NDArray[np.uint8]
     zone: NDArray[np.bool_]
-    wall: NDArray[np.bool_]
-    water: NDArray[np.bool_]
-    holes: int
+    gone: NDArray[np.bool_]
+    opening: bool
 
 
-def knock_out(state: NDArray[np.uint8], walls: Walls, longest: float, count: int, random: np.random.Generator) -> Exam:
-    """Take up to ``count`` pieces out of the walls, and the water out of up to a quarter as many openings."""
-    seen = state.copy()
-    zone = np.zeros(state.shape, bool)
-    for first, second in _openings(walls, state, longest, count // 4, random):
-        _blank_opening(first, second, seen, zone, state, random)
-    water = _widened(seen != state)
-    holes = 0
-    starts = np.argwhere(walls.centre)
-    for _ in range(_TRIES * count):
-        if holes == count or not len(starts):
-            break
-        length = math.exp(random.uniform(math.log(_SHORTEST), math.log(longest)))
-        start = starts[random.integers(len(starts))]
-        path = _piece((int(start[0]), int(start[1])), walls.centre, round(length))
-        if path is not None and not _near(path, zone):
-            _erase(path, walls, seen, zone, random)
-            holes += 1
-    return Exam(seen, zone, _widened((state == OCCUPIED) & (seen == UNKNOWN)), water, holes)
+def places(centre: NDArray[np.bool_], corner: Cell) -> list[Place]:
+    """Choose places on centre lines ``(rows, cols)``; ``corner`` is the grid's first cell, numbered in the map."""
+    cells = np.argwhere(centre)
+    numbers = _mixed(cells + corner)
+    order = np.argsort(numbers, kind="stable")[:_TRIED]
+    taken: list[Cell] = []
+    found = []
+    for (row, col), number in zip(cells[order].tolist(), numbers[order].tolist(), strict=True):
+        if all(max(abs(row - r), abs(col - c)) >= _APART for r, c in taken):
+            taken.append((row, col))
+            size = SIZES[number % len(SIZES)]
+            first = max(row - size // 2 - _ABOUT, 0), max(col - size // 2 - _ABOUT, 0)
+            found.append(Place(*first, (row - first[0], col - first[1]), size, number))
+    return found[:EXAMS]
+
+
+def window(place: Place, state: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Cut the window of an exam out of the map."""
+    reach = place.size // 2 + _ABOUT + 1
+    return state[place.row : place.row + place.middle[0] + reach, place.col : place.col + place.middle[1] + reach]
+
+
+def knock_out(state: NDArray[np.uint8], place: Place) -> Exam | None:
+    """Take a piece out of the wall in a window ``state``, or the water out of an opening; None where neither is."""
+    random = np.random.default_rng(place.number)
+    walls = find_walls(state == OCCUPIED)
+    if place.number // len(SIZES) % _OPENINGS == 0 and (gates := _openings(walls, state)):
+        return _blank_opening(*gates[int(random.integers(len(gates)))], state, random)
+    path = _piece(place.middle, walls.centre, place.size)
+    return None if path is None else _erase(path, walls, state, random)
+
+
+def _mixed(cells: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Scramble the numbers of cells ``(n, 2)`` into one ``(n,)`` each, of 31 bits (constants of splitmix64)."""
+    value = cells[:, 0].astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15) + cells[:, 1].astype(np.uint64)
+    for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB)):
+        value = (value ^ (value >> np.uint64(shift))) * np.uint64(factor)
+    return np.asarray(value >> np.uint64(33), np.int64)
 
 
 def _widened(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -102,47 +138,30 @@ def _next(at: Cell, centre: NDArray[np.bool_], seen: set[Cell]) -> list[Cell]:
     return sorted(line, key=lambda cell: abs(cell[0] - at[0]) + abs(cell[1] - at[1]))
 
 
-def _near(path: list[Cell], zone: NDArray[np.bool_]) -> bool:
-    rows, cols = np.array(path).T
-    low = max(int(rows.min()) - _APART, 0), max(int(cols.min()) - _APART, 0)
-    return bool(zone[low[0] : int(rows.max()) + _APART + 1, low[1] : int(cols.max()) + _APART + 1].any())
-
-
-def _erase(
-    path: list[Cell], walls: Walls, seen: NDArray[np.uint8], zone: NDArray[np.bool_], random: np.random.Generator
-) -> None:
+def _erase(path: list[Cell], walls: Walls, state: NDArray[np.uint8], random: np.random.Generator) -> Exam:
     """Forget the wall about ``path``, and as a sonar would that missed it, some of the water before it."""
-    cells = np.array(path)
-    margin = _STUB + int(len(path) / 2) + 4
-    low = np.maximum(cells.min(axis=0) - margin, 0)
-    high = cells.max(axis=0) + margin + 1
-    window = slice(low[0], high[0]), slice(low[1], high[1])
-    gone = np.ones(seen[window].shape, bool)
-    gone[tuple((cells - low).T)] = False
-    kept = walls.centre[window] & gone
-    to_gone = ndimage.distance_transform_edt(gone)
-    to_kept = ndimage.distance_transform_edt(~kept) if kept.any() else np.full(gone.shape, np.inf)
-    thick = float(walls.half[window][~gone].max())
-    wall = walls.mask[window] & (to_gone <= to_kept) & (to_gone <= thick + 1.5)
+    bare = np.ones(state.shape, bool)
+    bare[tuple(np.array(path).T)] = False
+    kept = walls.centre & bare
+    to_gone = ndimage.distance_transform_edt(bare)
+    to_kept = ndimage.distance_transform_edt(~kept) if kept.any() else np.full(bare.shape, np.inf)
+    thick = float(walls.half[~bare].max())
+    wall = walls.mask & (to_gone <= to_kept) & (to_gone <= thick + 1.5)
     halo = (0.0, random.uniform(1.0, 5.0), len(path) / 2 + 1.0)[int(random.integers(3))]
-    water = (to_gone <= halo) & (seen[window] == FREE)
-    seen[window][wall | water] = UNKNOWN
-    zone[window] |= to_gone <= max(4.0, len(path) / 2)
+    seen = np.where(wall | ((to_gone <= halo) & (state == FREE)), UNKNOWN, state).astype(np.uint8)
+    return Exam(seen, to_gone <= max(4.0, len(path) / 2), _widened(wall), False)
 
 
-def _openings(
-    walls: Walls, state: NDArray[np.uint8], longest: float, count: int, random: np.random.Generator
-) -> list[tuple[End, End]]:
+def _openings(walls: Walls, state: NDArray[np.uint8]) -> list[tuple[End, End]]:
     """Pairs of wall ends that look at each other across water seen free: true openings."""
     ends = walls.ends
     found = []
-    for first, second in _facing_pairs(ends, longest):
+    for first, second in _facing_pairs(ends, float(max(SIZES))):
         a, b = ends[first], ends[second]
         gap = math.hypot(b.x - a.x, b.y - a.y)
         if gap >= _NARROWEST and _open_between(a, b, gap, state):
             found.append((a, b))
-    chosen = random.permutation(len(found))[:count]
-    return [found[int(index)] for index in chosen]
+    return found
 
 
 def _facing_pairs(ends: tuple[End, ...], longest: float) -> list[tuple[int, int]]:
@@ -165,17 +184,12 @@ def _open_between(a: End, b: End, gap: float, state: NDArray[np.uint8]) -> bool:
     return bool(np.mean(between == FREE) > 0.8)
 
 
-def _blank_opening(
-    a: End, b: End, seen: NDArray[np.uint8], zone: NDArray[np.bool_], state: NDArray[np.uint8],
-    random: np.random.Generator,
-) -> None:  # fmt: skip
+def _blank_opening(a: End, b: End, state: NDArray[np.uint8], random: np.random.Generator) -> Exam:
     rows, cols = np.ogrid[: state.shape[0], : state.shape[1]]
     radius = math.hypot(b.x - a.x, b.y - a.y) / 2 * random.uniform(0.7, 1.1) + 1.0
     disc = (rows - (a.y + b.y) / 2) ** 2 + (cols - (a.x + b.x) / 2) ** 2 <= radius**2
-    if (disc & zone).any():
-        return
-    seen[disc & (state == FREE)] = UNKNOWN
-    zone |= disc
+    water = disc & (state == FREE)
+    return Exam(np.where(water, UNKNOWN, state).astype(np.uint8), disc, _widened(water), True)
 
 
 def near_wall(state: NDArray[np.uint8]) -> NDArray[np.bool_]:

@@ -23,6 +23,8 @@ class Hole:
     ``cells`` is ``(n, 2)`` int32 of row and column in the grid (row 0 south), connected, none of them measured as
     occupied or free; ``certainty`` ``(n,)`` float32 in 0 to 1 per cell; ``hole_certainty`` that the whole fill is
     right.  ``ends_m`` is ``(2, 2)`` float64, x and y of the two ends.  ``why`` is one sentence for a person.
+    ``parents`` are the indices of earlier holes whose fills this one goes on from: it is never surer than they are.
+    ``beyond_learnt``: the hole is unlike any that certainties were learnt on, and told the less sure for it.
     """
 
     index: int
@@ -33,6 +35,8 @@ class Hole:
     gap_m: float
     curve: str
     why: str
+    parents: tuple[int, ...] = ()
+    beyond_learnt: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,18 @@ from typing import Final
 
 from config.errors import UsageError
 from config.schema import Map
-from tools.bench import acquisition, beams, holes, holes_maps, holes_paper, holes_table, stations, tank, truth
+from tools.bench import (
+    acquisition,
+    beams,
+    holes,
+    holes_maps,
+    holes_paper,
+    holes_prior,
+    holes_table,
+    stations,
+    tank,
+    truth,
+)
 from tools.emulator.site import SITES
 from tools.emulator.vehicle import PILOTS
 
@@ -36,6 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="holes: what is lost (default: 1)")
     parser.add_argument("--pictures", type=Path, metavar="DIR", help="holes: draw what was filled right and wrong")
     parser.add_argument("--paper-measure", action="store_true", help="holes: also the measure of the paper's table 1")
+    parser.add_argument("--fit-prior", type=Path, metavar="FILE", help="holes: fit the prior of certainties instead")
     parser.add_argument("--json", action="store_true", help="print JSON lines")
 
 
@@ -97,6 +109,10 @@ def _acquisition(args: argparse.Namespace) -> Iterator[Row]:
 def _holes(args: argparse.Namespace) -> Iterator[Row]:
     if args.maps < 1 or args.seed < 0:
         raise UsageError("--maps must be at least 1 and --seed at least 0")
+    if args.fit_prior:
+        seeds = range(args.seed, args.seed + args.seeds)
+        yield from holes_prior.fit_prior(args.data, seeds, args.maps, args.fit_prior)
+        return
     yield from holes.measure(holes.HoleOptions(args.data, args.half, args.seed, args.maps, args.pictures))
     if args.paper_measure:
         yield from holes_paper.measure_as_paper(holes_maps.sources(args.data, args.half), args.seed)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fill.certainty import Logistic
+from fill.logistic import Logistic
 from fill.segments import find_walls
 
 

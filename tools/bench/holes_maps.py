@@ -20,7 +20,9 @@ from config.errors import DataError, InputError
 from mapping.values import FREE, OCCUPIED, UNKNOWN
 from tools.maps import read_map
 
-PRIOR_SAW: Final = frozenset({"nav2_map_labtech", "dmro_mapjuly", "building_31", "aces", "fhw", "infinite-corridor"})
+PRIOR_SAW: Final = frozenset(
+    {"nav2_map_labtech", "dmro_mapjuly", "building_31", "aces", "fhw", "infinite-corridor", "willow-2010-02-18-0.10"}
+)
 """Maps that the prior of certainties was learnt on: figures on these are flattered."""
 _SALT: Final = "720/"
 _SIDE: Final = 236  # cells of a piece without its margin

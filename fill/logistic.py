@@ -1,0 +1,42 @@
+"""A logistic model that can be taught."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+_STEPS: Final = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Logistic:
+    """A logistic model: ``weights`` ``(k,)`` and the ``precision`` ``(k, k)`` with which they are known."""
+
+    weights: NDArray[np.float64]
+    precision: NDArray[np.float64]
+
+    def chance(self, features: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Probability ``(n,)`` for features ``(n, k)``."""
+        return sigmoid(features @ self.weights)
+
+    def taught(self, features: NDArray[np.float64], right: NDArray[np.float64], count: NDArray[np.float64]) -> Logistic:
+        """Return the model after outcomes ``right`` ``(n,)`` of 0 or 1 were seen, each counting as ``count`` ``(n,)``.
+
+        Maximum a posteriori, by Newton's method.
+        """
+        weights = self.weights
+        curvature = self.precision
+        for _ in range(_STEPS):
+            chance = sigmoid(features @ weights)
+            slope = features.T @ (count * (right - chance)) - self.precision @ (weights - self.weights)
+            curvature = self.precision + (features * (count * chance * (1.0 - chance))[:, None]).T @ features
+            weights = weights + np.linalg.solve(curvature, slope)
+        return Logistic(weights, curvature)
+
+
+def sigmoid(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Logistic function, safe for any size of ``x``."""
+    return 0.5 * (1.0 + np.tanh(0.5 * x))
