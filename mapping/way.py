@@ -9,6 +9,7 @@ nothing, along a smooth tunnel, the cloud spreads as far as a vehicle can have g
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +23,12 @@ from mapping.view import TRUSTED_SD_M, VAGUE_SD_M, Field
 PARTICLES = 400
 BATCH = 4
 """Beams weighed together."""
-CHUNK_BEAMS = 160
-"""Beams whose echoes are picked together: less than a turn, so that its end does not meet its beginning."""
+GO_RAD = math.radians(200.0)
+"""Beams within this are picked together ..."""
+BESIDE_RAD = math.radians(60.0)
+"""... with their neighbours on either side: less than a turn, so that its end does not meet its beginning."""
+LEG_BEAMS = 5
+"""Beams by which the head is seen to turn round: the vehicle's heading trembles."""
 FEW_BEAMS = 20
 SPEED_M_S = 0.3
 """Standard deviation of the speed to either side ..."""
@@ -45,20 +50,40 @@ GAP_S = 5.0
 """After a pause of this the way was not seen."""
 
 Floats = NDArray[np.float64]
+Beams = NDArray[np.intp]
 
 
 def ranges_of(way: Way, config: Map) -> tuple[Floats, Floats]:
     """Range of each beam's wall ``(n,)``, nan where it abstains, and its trust, 0 to 1."""
     n = len(way.t_ns)
-    parts = np.array_split(np.arange(n), max(1, math.ceil(n / CHUNK_BEAMS)))
-    returns = [_returns(way, part, config) for part in parts]
-    range_m = np.concatenate([r.range_m for r in returns])
-    sd_m = np.concatenate([r.sd_m for r in returns])
+    range_m, sd_m = np.full(n, np.nan), np.full(n, np.nan)
+    for core, around in _goes(way.direction_rad):
+        returns = _returns(way, around, config)
+        kept = np.isin(around, core)
+        range_m[core], sd_m[core] = returns.range_m[kept], returns.sd_m[kept]
     clear = np.isfinite(range_m) & (np.nan_to_num(sd_m, nan=1.0) < VAGUE_SD_M)
     return np.where(clear, range_m, np.nan), np.where(clear, np.minimum(1.0, TRUSTED_SD_M / sd_m), 0.0)
 
 
-def _returns(way: Way, part: NDArray[np.intp], config: Map) -> Returns:
+def _goes(direction_rad: Floats) -> Iterator[tuple[Beams, Beams]]:
+    """Cut a way into beams to be picked together, less than a turn one way round, each with its neighbours.
+
+    A line of walls that breaks off has horns at its ends: neighbours are picked with them, and not kept.
+    """
+    step = np.diff(np.unwrap(direction_rad), prepend=direction_rad[:1])
+    way_round = np.sign(np.convolve(step, np.ones(LEG_BEAMS), mode="same"))
+    leg = np.cumsum(np.abs(np.diff(way_round, prepend=way_round[:1])) > 1.0)
+    turned = np.cumsum(np.abs(step))
+    for number in range(int(leg.max(initial=-1)) + 1):
+        of = np.flatnonzero(leg == number)
+        angle = turned[of] - turned[of[0]]
+        for k in range(int(angle[-1] / GO_RAD) + 1):
+            inside = (angle >= k * GO_RAD) & (angle < (k + 1) * GO_RAD)
+            near = (angle >= k * GO_RAD - BESIDE_RAD) & (angle < (k + 1) * GO_RAD + BESIDE_RAD)
+            yield of[inside], of[near]
+
+
+def _returns(way: Way, part: Beams, config: Map) -> Returns:
     if len(part) < FEW_BEAMS:
         silent = np.full(len(part), np.nan)
         return Returns(silent, silent, np.zeros(len(part)))

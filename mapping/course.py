@@ -1,0 +1,119 @@
+"""The course from one rest to the next: what was seen at both and on the way between, and how well a path fits it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.schema import Map
+from mapping.path import HERE, KNOT_S, THERE, WITNESS, Floats, Marks, bonds_of
+from mapping.sight import Sight
+from mapping.values import Pose, Way
+from mapping.view import HIT_FREE, HIT_UNKNOWN, from_map, to_map
+from mapping.way import ranges_of
+
+MOST_KNOTS = 64
+CLEAR = 0.3
+"""Wall points of a rest with less trust are no marks."""
+FINE_M = 0.03
+"""Width of walls where marks are bound along them."""
+BOUND_M = 0.15
+LEAST_KNOWN = 0.4
+"""Share of the marks, by trust, below which it counts against a path that little of them is known elsewhere."""
+HULL_M = 0.12
+"""A mark nearer to the path than this is a wall that the vehicle went through ..."""
+THROUGH = 2.0
+"""... which costs so much of the log-likelihood."""
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """A way cut into ``knots``, ``seconds`` long, with the marks of both rests and of the way between them."""
+
+    here: Sight
+    there: Sight
+    marks: Marks
+    seconds: float
+    knots: int
+
+    def when(self) -> Floats:
+        """Give the moment of each mark ``(n,)``, 0 at the first rest and 1 at the second."""
+        at = (self.marks.state - 1 + self.marks.share) / (self.knots - 1)
+        return np.clip(np.where(self.marks.group == HERE, 0.0, at), 0.0, 1.0)
+
+
+def course_of(here: Sight, there: Sight, way: Way, config: Map) -> Course:
+    """Gather the marks of two rests and of the way between them."""
+    since_s = (way.t_ns - way.t_ns[0]) * 1e-9
+    seconds = max(float(since_s[-1]), 4.0 * KNOT_S)
+    knots = min(math.ceil(seconds / KNOT_S) + 1, MOST_KNOTS)
+    range_m, trust = ranges_of(way, config)
+    heard = np.isfinite(range_m)
+    at = np.minimum(since_s / seconds * (knots - 1), knots - 1 - 1e-9)[heard]
+    turned = np.abs(np.diff(np.unwrap(way.direction_rad), prepend=way.direction_rad[:1])).cumsum()[heard]
+    direction, z = way.direction_rad[heard], range_m[heard]
+    parts = (_at_rest(here, 0, HERE), _at_rest(there, knots + 1, THERE))
+    state = at.astype(np.intp)
+    marks = Marks(
+        np.concatenate([*(p.arm_m for p in parts), np.stack([z * np.sin(direction), z * np.cos(direction)], axis=1)]),
+        np.concatenate([*(p.trust for p in parts), trust[heard]]),
+        np.concatenate([*(p.normal_rad for p in parts), np.full(len(z), np.nan)]),
+        np.concatenate([*(p.state for p in parts), state + 1]),
+        np.concatenate([*(p.share for p in parts), at - state]),
+        np.concatenate([*(p.group for p in parts), (turned / math.pi).astype(np.intp) + 1]),
+    )
+    return Course(here, there, marks, seconds, knots)
+
+
+def _at_rest(sight: Sight, state: int, group: int) -> Marks:
+    points = sight.view.points
+    clear = points.trust > CLEAR
+    heading = sight.scan.heading_rad
+    n = int(clear.sum())
+    arm = to_map(Pose(0.0, 0.0, heading), points.xy_m[clear])
+    normal = points.normal_rad[clear] - heading  # of axes that turn counter-clockwise
+    return Marks(arm, points.trust[clear], normal, np.full(n, state), np.zeros(n), np.full(n, group))
+
+
+def agreement(path: Floats, course: Course) -> float:
+    """Log-likelihood of the marks along a path: those that are known to both rests agree, or not, for all of them.
+
+    What falls where nothing is known must not count for a path, nor against it: along a passage the path on which the
+    vehicle did not move at all has most in common with itself.
+    """
+    marks = course.marks.along(path)
+    places, _ = marks.places(path)
+    bonds = bonds_of(marks, places, BOUND_M)
+    near = np.exp(-0.5 * (bonds.off_m / FINE_M) ** 2)
+    total = known = every = 0.0
+    for sight, group, at in ((course.here, HERE, path[0]), (course.there, THERE, path[-1])):
+        best, bound = np.zeros(len(places)), np.zeros(len(places), dtype=bool)
+        for side, other in ((bonds.one, bonds.other), (bonds.other, bonds.one)):
+            here = (marks.group[other] == group) & (marks.group[side] != group)
+            np.maximum.at(best, side[here], near[here])
+            bound[side[here]] = True
+        odds = best + np.where(bound, 0.5 * HIT_UNKNOWN, np.where(_free(sight, at, places), HIT_FREE, HIT_UNKNOWN))
+        told = bound | (odds == HIT_FREE)
+        trust = marks.trust * (marks.group != group)
+        total += float((trust * told) @ np.log(odds / HIT_UNKNOWN))
+        known += float(trust @ told)
+        every += float(trust.sum())
+    return WITNESS * total * every / max(known, LEAST_KNOWN * every, 1e-9) - THROUGH * _gone_through(
+        path, marks, places
+    )
+
+
+def _free(sight: Sight, at: Floats, places: Floats) -> NDArray[np.bool_]:
+    xy = from_map(Pose(float(at[0]), float(at[1]), float(at[2]) + sight.scan.heading_rad), places)
+    return sight.view.field.free.ravel().take(sight.view.field.cells(xy[:, 0], xy[:, 1]))
+
+
+def _gone_through(path: Floats, marks: Marks, places: Floats) -> float:
+    """Trust of the marks that lie on the path."""
+    fine = np.linspace(0.0, len(path) - 1, 4 * len(path))
+    x, y = (np.interp(fine, np.arange(len(path)), path[:, k]) for k in (0, 1))
+    apart = np.hypot(places[:, :1] - x, places[:, 1:] - y).min(axis=1)
+    return float(marks.trust[apart < HULL_M].sum())

@@ -1,0 +1,100 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from config.schema import Map
+from mapping.course import agreement, course_of
+from mapping.echoes import pick
+from mapping.path import HERE, THERE, improve, inertia
+from mapping.prior import Cloud
+from mapping.sight import Sight, sight_of
+from mapping.traverse import traverse
+from mapping.values import Way
+from tests.mapping.rooms import KEYHOLE, TUNNEL, Stay, pings
+from tests.mapping.test_scan_builder import build
+
+START = Stay(0.3, -0.2, 0.4, 330)
+
+
+def two_sights(walls: np.ndarray, there: Stay) -> tuple[Sight, Sight]:
+    scans = build(list(pings(walls, [START, there], np.random.default_rng(3))))
+    first, second = (sight_of(scan, pick(scan, Map()), Map()) for scan in scans)
+    return first, second
+
+
+def gone(pair: tuple[Sight, Sight]) -> Cloud:
+    assert pair[1].scan.way is not None
+    cloud = traverse(*pair, pair[1].scan.way, Map())
+    assert cloud is not None
+    return cloud
+
+
+@pytest.fixture(scope="module")
+def keyhole() -> tuple[Sight, Sight]:
+    return two_sights(KEYHOLE, Stay(0.1, 1.6, 1.2, 330, glide=250))
+
+
+@pytest.fixture(scope="module")
+def tunnel() -> tuple[Sight, Sight]:
+    return two_sights(TUNNEL, Stay(2.3, -0.1, 1.1, 330, glide=250))
+
+
+def test_in_a_room_a_traverse_is_right_and_sure(keyhole: tuple[Sight, Sight]) -> None:
+    cloud = gone(keyhole)
+    off = np.array([cloud.x_m + 0.2, cloud.y_m - 1.8])
+    assert np.hypot(*off) < 0.05
+    assert cloud.sd_m < 0.15
+    assert off @ np.linalg.solve(cloud.covariance, off) < 6.0
+
+
+def test_along_a_smooth_tunnel_a_traverse_knows_that_it_does_not_know(tunnel: tuple[Sight, Sight]) -> None:
+    cloud = gone(tunnel)
+    assert math.sqrt(cloud.covariance[0, 0]) > 0.6
+    assert math.sqrt(cloud.covariance[1, 1]) < 0.2
+    off = np.array([cloud.x_m - 2.0, cloud.y_m - 0.1])
+    assert off @ np.linalg.solve(cloud.covariance, off) < 6.0
+
+
+def test_the_same_way_gives_the_same_traverse(keyhole: tuple[Sight, Sight]) -> None:
+    one, two = gone(keyhole), gone(keyhole)
+    assert (one.x_m, one.y_m, one.covariance.tobytes()) == (two.x_m, two.y_m, two.covariance.tobytes())
+
+
+def test_a_way_with_a_pause_was_not_seen(keyhole: tuple[Sight, Sight]) -> None:
+    way = keyhole[1].scan.way
+    assert way is not None
+    late = way.t_ns + np.where(np.arange(len(way.t_ns)) > 100, 20_000_000_000, 0)
+    assert traverse(*keyhole, Way(late, way.direction_rad, way.echoes, way.bin_m, way.step_rad), Map()) is None
+
+
+def test_a_way_of_which_nothing_was_heard_leaves_the_rests_to_speak(keyhole: tuple[Sight, Sight]) -> None:
+    way = keyhole[1].scan.way
+    assert way is not None
+    silent = Way(way.t_ns, way.direction_rad, np.zeros_like(way.echoes), way.bin_m, way.step_rad)
+    cloud = traverse(*keyhole, silent, Map())
+    assert cloud is not None
+    off = np.array([cloud.x_m + 0.2, cloud.y_m - 1.8])
+    assert off @ np.linalg.solve(cloud.covariance, off) < 9.0
+
+
+def test_a_path_that_is_a_little_wrong_settles_where_the_vehicle_went(keyhole: tuple[Sight, Sight]) -> None:
+    here, there = keyhole
+    assert there.scan.way is not None
+    course = course_of(here, there, there.scan.way, Map())
+    assert set(course.marks.group) >= {HERE, THERE, 1, 2}
+    assert course.when().min() == 0.0
+    assert course.when().max() == 1.0
+    path = np.zeros((course.knots + 2, 3))
+    path[1:-1, :2] = np.linspace(0.0, 1.0, course.knots)[:, None] * [-0.1, 1.7]
+    path[-1, :2] = (-0.1, 1.7)
+    prior = inertia(course.seconds, course.knots)
+    settled = path
+    for within_m in (0.3, 0.15):
+        settled, information = improve(settled, course.marks.along(settled), prior, within_m, 3)
+    assert np.hypot(*(settled[-1, :2] - [-0.2, 1.8])) < 0.04
+    assert agreement(settled, course) > agreement(path, course) + 5.0
+    assert np.linalg.eigvalsh(information[3:, 3:]).min() > 0.0
+    assert np.all(settled[0] == 0.0)
