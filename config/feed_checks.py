@@ -35,8 +35,8 @@ _HEEDED: Final[dict[str, tuple[str, ...]]] = {
 """Keys that only some drivers heed."""
 
 _TELLS: Final[dict[str, tuple[str, ...]]] = {
-    "nmea": ("heading", "depth", "altitude"),
-    "mavlink": ("heading", "depth"),
+    "nmea": ("heading", "depth", "altitude", "odometry"),
+    "mavlink": ("heading", "depth", "odometry"),
     "videoray_pro3": ("heading", "depth"),
     "videoray_pro4": ("heading", "depth"),
     "pressure": ("depth",),

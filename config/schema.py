@@ -10,7 +10,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-Quantity = Literal["heading", "depth", "altitude"]
+Quantity = Literal["heading", "depth", "altitude", "odometry"]
 FeedDriver = Literal["nmea", "mavlink", "videoray_pro3", "videoray_pro4", "pressure"]
 
 FRESH_WATER_KG_M3 = 997.0
@@ -87,7 +87,7 @@ def _usual_quantities(known: dict[str, Any]) -> tuple[Quantity, ...]:
 
 
 class Feed(Section):
-    """A line that tells heading, depth or altitude.  Keys that only some drivers heed say which."""
+    """A line that tells heading, depth, altitude or odometry.  Keys that only some drivers heed say which."""
 
     name: str = Field("feed", pattern=r"^[a-z][a-z0-9_-]{0,31}$")
     driver: FeedDriver = "nmea"
@@ -119,6 +119,8 @@ class Feed(Section):
         None, ge=500, le=1200, description="absolute pressure at the surface; absent: 1013.25 until a tare"
     )
     max_dive_m_s: float = Field(3.0, gt=0, le=100, description="faster dives are jumps of the depth")
+    odometry_sd_pct: float = Field(3.0, gt=0, le=100, description="error of odometry, in percent of the way")
+    max_speed_m_s: float = Field(3.0, gt=0, le=100, description="faster odometry is a jump")
     max_climb_m_s: float = Field(5.0, gt=0, le=100, description="faster changes are jumps of the altitude")
 
     checksum: Literal["require", "warn", "ignore"] = Field("require", description="nmea")

@@ -17,9 +17,10 @@ from config.schema import Feed, Site
 from drivers.counters import Counters
 from drivers.deviation import Deviation
 from drivers.hydrostatics import Surface, depth_m, surface_of
+from drivers.odometry import Odometer
 from drivers.quality import GOOD, JumpGate, Opinion, worst
-from drivers.readings import Altitude, Depth, Heading, Reading
-from drivers.statements import Meaning, Message, Reader, Statement
+from drivers.readings import Altitude, Depth, Heading, Odometry, Reading
+from drivers.statements import AnyStatement, Located, Meaning, Message, Moved, Reader, Statement
 
 _TURN_SLACK_DEG: Final = 15.0
 """Sentences that a network delivers together have one date, and a turning vehicle some degrees between them."""
@@ -49,6 +50,7 @@ class FeedDecoder:
         self._turns = JumpGate(feed.max_turn_deg_s, _TURN_SLACK_DEG, "degrees", turn=360.0)
         self._dives = JumpGate(feed.max_dive_m_s, _DIVE_SLACK_M, "m")
         self._climbs = JumpGate(feed.max_climb_m_s, _CLIMB_SLACK_M, "m")
+        self._odometer = Odometer(feed)
         self._latency_ns = round(feed.latency_ms * 1e6)
 
     @property
@@ -80,9 +82,21 @@ class FeedDecoder:
 
     def _readings(self, message: Message) -> Iterator[Reading]:
         for statement in message.statements:
-            reading = self._reading(message.t_ns - self._latency_ns, message.name, statement)
+            t_ns = message.t_ns - self._latency_ns
+            reading = self._understood(t_ns, message.name, statement)
             if reading is not None:
                 yield reading
+
+    def _understood(self, t_ns: int, name: str, said: AnyStatement) -> Reading | None:
+        return self._reading(t_ns, name, said) if isinstance(said, Statement) else self._way(t_ns, name, said)
+
+    def _way(self, t_ns: int, name: str, said: Moved | Located) -> Odometry | None:
+        if "odometry" not in self._feed.provides:
+            return None
+        if isinstance(said, Moved):
+            return self._odometer.moved(t_ns, self._source(name), said)
+        is_true = self._feed.heading_reference == "true"
+        return self._odometer.located(t_ns, self._source(name), said, 0.0 if is_true else self._variation_deg)
 
     def _reading(self, t_ns: int, name: str, said: Statement) -> Reading | None:
         match said.what:

@@ -9,10 +9,10 @@ from typing import Protocol
 
 from config.errors import FrameError
 from drivers.counters import Counters
-from drivers.statements import Message, Statement
+from drivers.statements import AnyStatement, Message
 from drivers.wire import Cut, Cutter, Judge
 
-Said = tuple[str, Sequence[Statement]]
+Said = tuple[str, Sequence[AnyStatement]]
 """Name of a frame and what it says."""
 
 

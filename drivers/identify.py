@@ -19,7 +19,7 @@ from drivers.guess import guess_columns
 from drivers.keller import Keller
 from drivers.mavlink import Mavlink
 from drivers.nmea import NmeaReader
-from drivers.readings import Altitude, Depth, Heading, Reading
+from drivers.readings import Altitude, Depth, Heading, Odometry, Reading
 from drivers.records import Json
 from drivers.statements import Reader
 from drivers.tritech.framing import Deframer
@@ -35,7 +35,12 @@ _LEAST_MESSAGES: Final = {("videoray_pro3", "text"): 3, ("pressure", "text"): 4}
 _UNCHECKED: Final = {"other", "other_system", "request"}
 """Messages that are known by little, or are not the device's own."""
 _LINE: Final = "socket://line:0"
-_QUANTITIES: Final[dict[type[Reading], Quantity]] = {Heading: "heading", Depth: "depth", Altitude: "altitude"}
+_QUANTITIES: Final[dict[type[Reading], Quantity]] = {
+    Heading: "heading",
+    Depth: "depth",
+    Altitude: "altitude",
+    Odometry: "odometry",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +69,7 @@ def identify(pieces: Pieces) -> list[Heard]:
 
 def _listeners() -> list[Feed]:
     return [
-        Feed(port=_LINE, provides=("heading", "depth", "altitude")),
+        Feed(port=_LINE, provides=("heading", "depth", "altitude", "odometry")),
         Feed(driver="mavlink", port=_LINE),
         Feed(driver="videoray_pro3", port=_LINE),
         Feed(driver="videoray_pro4", port=_LINE),

@@ -1,4 +1,4 @@
-"""MAVLink 1 and 2, listened to: heading and depth of an autopilot (ArduSub), without ever sending a byte.
+"""MAVLink 1 and 2, listened to: heading, depth and way of an autopilot (ArduSub), without ever sending a byte.
 
 A frame's checksum (X.25) also covers a byte that each message's layout has for its own, so only messages that are
 known here can be checked.  An unknown one is believed, and skipped whole, where it stands between frames.
@@ -19,7 +19,7 @@ from config.errors import FrameError
 from config.schema import Feed
 from drivers.framed import FrameReader, Said
 from drivers.readings import Quality
-from drivers.statements import Meaning, Statement
+from drivers.statements import Located, Meaning, Moved, Statement
 from drivers.wire import MORE, byte_ns
 
 _V1: Final = 0xFE
@@ -35,6 +35,7 @@ _AUTOPILOT: Final = 1
 _VEHICLES: Final = {2: "quadrotor", 6: "ground station", 10: "rover", 11: "boat", 12: "submarine"}
 _MAKERS: Final = {3: "ArduPilot", 12: "PX4"}
 _MOST_MBAR: Final = 1e7
+_WAYS: Final = frozenset({"LOCAL_POSITION_NED", "VISION_POSITION_DELTA"})
 _PRESSURES: Final = {"SCALED_PRESSURE": 1, "SCALED_PRESSURE2": 2, "SCALED_PRESSURE3": 3}
 
 
@@ -53,11 +54,13 @@ LAYOUTS: Final = {
     27: Layout("RAW_IMU", 144, 26),
     29: Layout("SCALED_PRESSURE", 115, 14),
     30: Layout("ATTITUDE", 39, 28),
+    32: Layout("LOCAL_POSITION_NED", 185, 28),
     33: Layout("GLOBAL_POSITION_INT", 104, 28),
     74: Layout("VFR_HUD", 20, 20),
     137: Layout("SCALED_PRESSURE2", 195, 14),
     143: Layout("SCALED_PRESSURE3", 131, 14),
     178: Layout("AHRS2", 47, 24),
+    11011: Layout("VISION_POSITION_DELTA", 106, 44),
 }
 
 
@@ -142,9 +145,12 @@ class Mavlink:
         taken = _taken_apart(frame)
         if self._system is None and taken.component == _AUTOPILOT and taken.name != "other":
             self._system = taken.system
-        if (taken.system, taken.component) != (self._system, _AUTOPILOT):
+        # A velocity log's driver is a component of its own beside the autopilot.
+        is_ours = taken.component == _AUTOPILOT or taken.name == "VISION_POSITION_DELTA"
+        if taken.system != self._system or not is_ours:
             return "other_system", ()
-        return taken.name, [each for each in [self._statement(taken)] if each is not None]
+        said = _way(taken) if taken.name in _WAYS else self._statement(taken)
+        return taken.name, () if said is None else (said,)
 
     def _statement(self, frame: _Frame) -> Statement | None:
         name, payload = frame.name, frame.payload
@@ -169,6 +175,21 @@ class Mavlink:
         stands = self._boot_ms.get(frame.name) == boot_ms
         self._boot_ms[frame.name] = boot_ms
         return ("suspect", "stale: the autopilot's clock stands still") if stands else ("good", "")
+
+
+def _way(frame: _Frame) -> Moved | Located:
+    """Read a displacement (ahead, right, down in body axes), or a place north, east and below an origin."""
+    if frame.name == "VISION_POSITION_DELTA":
+        _, dt_us, *_, ahead_m, right_m, _, confidence = struct.unpack("<QQ7f", frame.payload[:44])
+        if not all(map(math.isfinite, (ahead_m, right_m))):
+            raise FrameError("field")
+        if confidence > 0.0:
+            return Moved(right_m, ahead_m, dt_us * 1e-6)
+        return Moved(right_m, ahead_m, dt_us * 1e-6, "bad", "the sender is not sure at all (confidence 0)")
+    boot_ms, north_m, east_m = struct.unpack_from("<Iff", frame.payload)
+    if not all(map(math.isfinite, (north_m, east_m))):
+        raise FrameError("field")
+    return Located(east_m, north_m, boot_ms * 1e-3)
 
 
 def _checked(what: Meaning, value: float, most: float, quality: Quality = "good", reason: str = "") -> Statement:

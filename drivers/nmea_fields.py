@@ -9,7 +9,7 @@ from typing import Final
 
 from config.errors import FrameError
 from drivers.readings import Quality
-from drivers.statements import Meaning, Statement
+from drivers.statements import AnyStatement, Meaning, Statement
 
 _NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)")
 _DEEPEST_M: Final = 12_000.0
@@ -33,7 +33,7 @@ class Dialect:
 
 
 Fields = Sequence[str]
-Statements = Iterator[Statement]
+Statements = Iterator[AnyStatement]
 
 
 def number(fields: Fields, at: int) -> float | None:

@@ -20,14 +20,14 @@ from drivers.nmea_fields import (
     text,
 )
 from drivers.readings import Quality
-from drivers.statements import Meaning, Statement
+from drivers.statements import AnyStatement, Meaning, Moved, Statement
 
 _LETTERS: Final = re.compile(r"C-?\d+(?:\.\d+)?(?:[A-Z][a-z]?-?\d+(?:\.\d+)?)*")
 _TAGGED: Final = re.compile(r"([A-Z][a-z]?)(-?\d+(?:\.\d+)?)")
 _DBAR_MBAR: Final = 100.0
 
 
-def read_letters(body: str, dialect: Dialect) -> list[Statement] | None:
+def read_letters(body: str, dialect: Dialect) -> list[AnyStatement] | None:
     """Return what a sentence of letters and numbers without commas says, None where it is not one."""
     return list(_letters(body, dialect)) if _LETTERS.fullmatch(body) else None
 
@@ -141,7 +141,19 @@ def _isads(fields: Fields) -> Statements:
         yield from state_length(Meaning.ALTITUDE, number(fields, 0))
 
 
+def _dvpdl(fields: Fields) -> Statements:
+    """Cerulean velocity logs: displacement ahead, right and down in body axes, and a confidence from 0 to 100."""
+    dt_us, ahead_m, right_m = number(fields, 1), number(fields, 5), number(fields, 6)
+    if dt_us is None or ahead_m is None or right_m is None:
+        return
+    if number(fields, 8):
+        yield Moved(right_m, ahead_m, dt_us * 1e-6)
+    else:
+        yield Moved(right_m, ahead_m, dt_us * 1e-6, "bad", "the velocity log does not see the floor (confidence 0)")
+
+
 PROPRIETARY: Final[dict[str, Callable[[Fields], Statements]]] = {
+    "DVPDL": _dvpdl,
     "ISADS": _isads,
     "OHPR": _ohpr,
     "PASHR": _pashr,

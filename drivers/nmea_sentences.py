@@ -11,14 +11,14 @@ from typing import Final
 from config.errors import FrameError
 from drivers.nmea_fields import Dialect, Fields, Statements, number, state_heading, state_length, state_pressure, text
 from drivers.nmea_proprietary import PROPRIETARY, TRUE_NORTH, read_letters
-from drivers.statements import Meaning, Statement
+from drivers.statements import AnyStatement, Meaning, Statement
 
 _FOOT_M: Final = 0.3048
 _FATHOM_M: Final = 1.8288
 _MBAR: Final = {"B": 1000.0, "P": 0.01}
 
 
-def read(address: str, fields: Fields, dialect: Dialect) -> tuple[str, list[Statement]] | None:
+def read(address: str, fields: Fields, dialect: Dialect) -> tuple[str, list[AnyStatement]] | None:
     """Name of a sentence and what it says, or None for one that says nothing about heading or depth.
 
     ``address`` is the first field, without ``$``.  Raises FrameError for a field that is not what it must be.

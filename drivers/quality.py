@@ -6,7 +6,7 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import Final
 
-from drivers.readings import Altitude, Depth, Heading, Quality, Reading
+from drivers.readings import Altitude, Depth, Heading, Odometry, Quality, Reading
 
 _RANK: Final[dict[Quality, int]] = {"good": 0, "suspect": 1, "bad": 2}
 _AGREE: Final = 3
@@ -98,7 +98,7 @@ class Tally:
 
     def take(self, reading: Reading) -> None:
         """Count a reading of a feed."""
-        if isinstance(reading, Heading | Depth | Altitude):
+        if isinstance(reading, Heading | Depth | Altitude | Odometry):
             self.counts[reading.quality] += 1
             self.last_reason = reading.reason or self.last_reason
             quantity = type(reading).__name__.lower()

@@ -84,7 +84,27 @@ class Altitude:
     reason: str = ""
 
 
-Reading = Ping | Heading | Depth | Altitude
+@dataclass(frozen=True, slots=True)
+class Odometry:
+    """Displacement of the vehicle in the ``dt_s`` before ``t_ns``.
+
+    ``dx_m`` and ``dy_m`` are to starboard and ahead where ``in_vehicle``, else east and north of the configured north.
+    ``sd_m`` is the standard deviation of each; those of successive displacements add up, for what is wrong in an
+    instrument (its scale, how it is mounted) stays wrong.
+    """
+
+    t_ns: int
+    dt_s: float
+    dx_m: float
+    dy_m: float
+    sd_m: float
+    in_vehicle: bool
+    source: str
+    quality: Quality = "good"
+    reason: str = ""
+
+
+Reading = Ping | Heading | Depth | Altitude | Odometry
 
 
 def is_usable(reading: Reading) -> bool:

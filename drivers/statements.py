@@ -37,12 +37,37 @@ class Statement:
 
 
 @dataclass(frozen=True, slots=True)
+class Moved:
+    """How far the vehicle moved in the last ``dt_s``, in the instrument's own axes."""
+
+    right_m: float
+    ahead_m: float
+    dt_s: float
+    quality: Quality = "good"
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Located:
+    """Where the vehicle is, from an origin that nobody knows, at ``clock_s`` of the device's own clock."""
+
+    east_m: float
+    north_m: float
+    clock_s: float
+    quality: Quality = "good"
+    reason: str = ""
+
+
+AnyStatement = Statement | Moved | Located
+
+
+@dataclass(frozen=True, slots=True)
 class Message:
     """One whole message: ``t_ns`` is when its first byte came, ``name`` what counters and sources call it."""
 
     t_ns: int
     name: str
-    statements: tuple[Statement, ...] = ()
+    statements: tuple[AnyStatement, ...] = ()
 
 
 class Reader(Protocol):

@@ -49,6 +49,11 @@ class Prior:
     gaussian: bool = False
     cloud: Cloud | None = None
 
+    @property
+    def is_led(self) -> bool:
+        """Whether odometry led here: it is surer than any pilot."""
+        return self.gaussian and self.reach_m < HINT_SD_M
+
     def draw(self, n: int, rng: np.random.Generator) -> Floats:
         """Draw ``(n, 3)`` poses; with a cloud half of them from it."""
         if self.gaussian:
@@ -63,9 +68,9 @@ class Prior:
         return np.column_stack([xy, self.heading_rad + rng.normal(0.0, self.heading_sd_rad, n)])
 
     def astray(self, pose: Floats) -> float:
-        """Tell how many standard deviations a pose ``(3,)`` is from the cloud; 0 without one."""
+        """Tell how many standard deviations a pose ``(3,)`` is from the cloud, or from where odometry led; else 0."""
         if self.cloud is None:
-            return 0.0
+            return math.hypot(pose[0] - self.x_m, pose[1] - self.y_m) / self.reach_m if self.is_led else 0.0
         away = pose[:2] - [self.cloud.x_m, self.cloud.y_m]
         return math.sqrt(float(away @ np.linalg.solve(self.cloud.covariance, away)))
 
@@ -86,11 +91,12 @@ class Prior:
 
 @dataclass(frozen=True, slots=True)
 class Hint:
-    """The pilot's word on the way since the last station, east and north."""
+    """The pilot's word, or odometry's, on the way since the last station, east and north."""
 
     dx_m: float
     dy_m: float
     sd_m: float
+    least_sd_m: float = HINT_SD_M
 
     def then(self, other: Hint) -> Hint:
         """Join this hint and the one for the way after it."""
@@ -98,7 +104,7 @@ class Hint:
 
     def prior(self, from_x_m: float, from_y_m: float, heading_rad: float, heading_sd_rad: float) -> Prior:
         """Say where a scan may have been made that follows a known place."""
-        sd_m = max(self.sd_m, HINT_SD_M)
+        sd_m = max(self.sd_m, self.least_sd_m)
         return Prior(from_x_m + self.dx_m, from_y_m + self.dy_m, sd_m, heading_rad, heading_sd_rad, gaussian=True)
 
 

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.schema import Map
-from drivers.readings import Altitude, Depth, Heading, Ping, Reading
+from drivers.readings import Altitude, Depth, Heading, Odometry, Ping, Reading
 from mapping.compass import Track
+from mapping.odometry import Odometer
 from mapping.passage import Passage
 from mapping.rest import FROZEN, SECTOR_BEAMS, Agreement, common_to_all, compare, frozen, grain_of, profile, still
 from mapping.turns import (
@@ -31,29 +32,24 @@ from mapping.turns import (
 )
 from mapping.values import Scan
 
-HOLD_NS = 1_000_000_000
-"""A ping waits this long for a heading at or after it."""
+HOLD_NS = 1_000_000_000  # a ping waits this long for a heading at or after it
 CONFIRM_RAD = math.radians(120.0)
 """A circle is believed when this much of the next turn agrees with it: who drives along a wall sees that one wall
 unchanged, but hardly over more than this."""
 CONFIRM_LEFT_RAD = math.radians(80.0)
 """... or this much, where the vehicle then leaves and its heading was steady."""
-CONFIRM_END_RAD = math.radians(30.0)
-"""... or this much, where the log ends."""
+CONFIRM_END_RAD = math.radians(30.0)  # ... or this much, where the log ends
 LOOSE_PINGS = 600  # ... and so many on end where the walls agree and their grain, frozen at an earlier rest, does not
-STEADY_RAD = math.radians(12.0)
-"""The heading's range within a circle at rest and the beams that confirm it."""
+STEADY_RAD = math.radians(12.0)  # the heading's range within a circle at rest and the beams that confirm it
 STEADY_LATE_RAD = math.radians(4.0)
-SWEEP_SHARE = 0.75  # of a sector sweep, which the sweep back must confirm
-PARTIAL_RAD = math.radians(60.0)  # smaller arcs are no scan
+SWEEP_SHARE, PARTIAL_RAD = 0.75, math.radians(60.0)  # of a sector, which the sweep back confirms; less is no scan
 UNSTEADY_PINGS = 10  # beams on end that disagree: the vehicle moves
 LEFT_OF, LEFT_SHARE = 100, 0.5  # a rest is over when so many of the last beams disagree
 RACE_RAD_S = math.radians(8.0)
 DEPTH_STEP_M = 0.4
 COMMON_PINGS, COMMON_OF = 16, 256
 """What is common to all bearings is found anew every so many pings, from so many."""
-GRAINY = 0.75
-"""Median correlation of the grain at a rest from which its loss tells motion in this dive."""
+GRAINY = 0.75  # median correlation of the grain at a rest from which its loss tells motion in this dive
 GRAIN_BEAMS = 64  # of those that agree, whose grain is asked for
 KEEP_TURNS = 2.2
 MAX_PINGS = 8192  # bound of the buffer when the head does not turn
@@ -71,6 +67,7 @@ class ScanBuilder:
         self._held: list[Ping] = []
         self._count = 0
         self._passage = Passage()
+        self._odometer = Odometer()
         self._grainy = False  # whether speckle was frozen at an earlier rest
         self._restart()
 
@@ -81,6 +78,8 @@ class ScanBuilder:
                 self._headings.add(reading.t_ns, reading.heading_rad)
             case Depth():
                 self._depths.add(reading.t_ns, reading.depth_m)
+            case Odometry():
+                self._odometer.add(reading, self._heading(reading.t_ns))
             case Altitude():
                 return []
             case Ping():
@@ -283,6 +282,7 @@ class ScanBuilder:
             step_rad=step_of(beams),
             quality=quality,
             way=self._passage.way_to(start_ns),
+            moved=self._odometer.since_last((start_ns + end_ns) // 2),
         )
         self._passage.begin([b for b in self._beams if b.ping.t_ns > end_ns])
         self._count += 1

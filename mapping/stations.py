@@ -18,6 +18,7 @@ from mapping.compass import wrap
 from mapping.graph import put_at, seen_from
 from mapping.grid import Canvas
 from mapping.hypotheses import ASKED, lies
+from mapping.led import along, led
 from mapping.pieces import Pieces
 from mapping.prior import Hint, Prior, agreed
 from mapping.sight import Sight
@@ -109,7 +110,7 @@ class Stations:
         sight = self._sights[i]
         seeds = [self._config.seed, sight.scan.index, base]
         prior = self._prior(i, base, np.random.default_rng([*seeds, 1]))
-        match = self._charts.match(sight, base, prior, np.random.default_rng(seeds))
+        match = along(self._charts.match(sight, base, prior, np.random.default_rng(seeds)), prior)
         piece = 0 if base in self._map else self._sights[base].scan.index + 1
         return judge(sight.scan, match, piece, prior, chained=abs(base - i) == 1)
 
@@ -121,6 +122,8 @@ class Stations:
         hint = self._hint(base, i)
         if hint is not None:
             prior = hint.prior(at.x_m, at.y_m, heading, sd)
+        elif (way := self._led(base, i)) is not None:
+            prior = way.prior(at.x_m, at.y_m, heading, sd)
         else:
             prior = Prior(at.x_m, at.y_m, self._config.reach_m * min(steps, BACK), heading, sd)
         ways = self._ways(base, i)
@@ -143,6 +146,12 @@ class Stations:
         for hint in hints[1:]:
             whole = whole.then(hint)
         return whole if base < i else Hint(-whole.dx_m, -whole.dy_m, whole.sd_m)
+
+    def _led(self, base: int, i: int) -> Hint | None:
+        """Where odometry led from a station to a scan, back where it came later; None where it does not tell well."""
+        between = [self._sights[k].scan.moved for k in range(min(base, i) + 1, max(base, i) + 1)]
+        turn_rad = self._pieces.pose(base).heading_rad - self._sights[base].scan.heading_rad
+        return led(between, turn_rad, back=base > i, reach_m=self._config.reach_m)
 
     def _ways(self, base: int, i: int) -> list[Way]:
         """Ways from a station to another, turned round where it came later; none where one was not seen."""

@@ -46,6 +46,15 @@ class Way:
 
 
 @dataclass(frozen=True, slots=True)
+class Displacement:
+    """Way from one scan to the next as an odometry feed tells it, east and north by the compass; ``sd_m`` of each."""
+
+    dx_m: float
+    dy_m: float
+    sd_m: float
+
+
+@dataclass(frozen=True, slots=True)
 class Scan:
     """A circle (or a part of one) of pings made at rest.
 
@@ -53,7 +62,8 @@ class Scan:
     heading (the compass's change during the scan is already in it), ``echoes`` ``(n, n_bins)`` uint8.  Beams are in the
     order in which they came.  ``quality`` is ``full`` for a whole circle at rest, ``partial`` for less than a circle,
     ``moving`` where the scan's own beams disagree.  ``depth_m`` is nan where no depth was told.  ``way`` holds the
-    pings since the scan before, None where the way was not seen whole.
+    pings since the scan before, None where the way was not seen whole; ``moved`` is how far odometry led since then,
+    None without it.
     """
 
     index: int
@@ -67,6 +77,7 @@ class Scan:
     step_rad: float
     quality: Literal["full", "partial", "moving"]
     way: Way | None = None
+    moved: Displacement | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from config.schema import Map
+from mapping.led import LED_FIT, LED_MARGIN, LED_OVERLAP
 from mapping.prior import Prior
 from mapping.register import Match
 from mapping.values import Pose, Scan, Station, Status
@@ -40,8 +41,8 @@ def judge(scan: Scan, match: Match, piece: int, prior: Prior, *, chained: bool) 
     sd_m = math.sqrt(float(np.linalg.eigvalsh(match.covariance[:2, :2])[-1]))
     seen = prior.cloud is not None and prior.cloud.sd_m <= SEEN_SD_M
     lost = piece > 0 or (prior.cloud is not None and not seen)
-    margin, fit = _needed(seen, lost, chained)
-    fits = match.overlap >= ACCEPT_OVERLAP and match.fit >= fit
+    margin, fit = (LED_MARGIN, LED_FIT) if prior.is_led else _needed(seen, lost, chained)
+    fits = match.overlap >= (LED_OVERLAP if prior.is_led else ACCEPT_OVERLAP) and match.fit >= fit
     status: Status = "placed"
     if match.margin < margin or not fits or sd_m > ACCEPT_SD_M or match.astray > ASTRAY:
         status, piece = "doubtful" if match.margin >= DOUBT_MARGIN else "unplaced", scan.index + 1

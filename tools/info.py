@@ -95,6 +95,7 @@ def facts(session: Session) -> dict[str, Any]:
         "heading": _values(gathered.compass.values, "deg") | {"arc_deg": gathered.compass.arc_deg},
         "depth": _values(gathered.depth, "m"),
         "altitude": _values(gathered.altitude, "m"),
+        "odometry": _values(gathered.odometry, "m"),
         "clock_pairs": gathered.clock_pairs,
         "events": dict(gathered.events),
         "first_events": gathered.first_events,
@@ -203,7 +204,7 @@ def _values_text(body: dict[str, Any]) -> Iterator[str]:
     if heading["count"]:
         left, right = heading["arc_deg"]
         yield f"  heading    {heading['count']} readings{_per_s(heading)}, within {left} to {right} deg"
-    for name in ("depth", "altitude"):
+    for name in ("depth", "altitude", "odometry"):
         values = body[name]
         if values["count"]:
             span = f"{values['min_m']:.2f} to {values['max_m']:.2f} m"

@@ -10,7 +10,7 @@ from typing import Any, Final
 from config.schema import Config
 from drivers.decoders import Decoder, decoders_for, heed
 from drivers.quality import Tally
-from drivers.readings import Altitude, Depth, Heading, HeadSettings, Ping, Reading, is_usable
+from drivers.readings import Altitude, Depth, Heading, Odometry, HeadSettings, Ping, Reading, is_usable
 from drivers.records import Chunk, ClockPair, Event, Record
 
 GAP_S: Final = 2.0
@@ -164,6 +164,7 @@ class SessionFacts:
     def __init__(self, config: Config) -> None:
         self.ports: dict[str, PortFacts] = {}
         self.turning, self.compass, self.depth, self.altitude = Turning(), Compass(), Values(), Values()
+        self.odometry = Values()
         self.events: Counter[str] = Counter()
         self.first_events: list[dict[str, Any]] = []
         self.clock_pairs = 0
@@ -222,6 +223,8 @@ class SessionFacts:
                 self.depth.take(at_s, reading.depth_m)
             case Altitude():
                 self.altitude.take(at_s, reading.altitude_m)
+            case Odometry():
+                self.odometry.take(at_s, math.hypot(reading.dx_m, reading.dy_m))
 
 
 def rate(count: float, seconds: float) -> float | None:

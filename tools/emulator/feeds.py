@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import reduce
-from math import cos, degrees, radians
+from math import cos, degrees, radians, sin
 from typing import Literal
 
 import numpy as np
@@ -20,7 +20,9 @@ SECOND_NS = 1_000_000_000
 class FeedOptions:
     """How the sensors err.  The compass reads magnetic: true heading less declination, plus bias and deviation.
 
-    ``deviation_deg`` is the amplitude of a one-cycle deviation (hard iron), greatest at ``deviation_at_deg``.
+    ``deviation_deg`` is the amplitude of a one-cycle deviation (hard iron), greatest at ``deviation_at_deg``.  A
+    velocity log, where ``odometry_hz`` says that there is one, tells ways too long by a scale, from a mounting that is
+    turned, with noise in each: its sum drifts.
     """
 
     baud: int = 4800
@@ -33,10 +35,17 @@ class FeedOptions:
     deviation_at_deg: float = 60.0
     declination_deg: float = 0.0
     depth_sd_m: float = 0.01
+    odometry_hz: float = 0.0
+    odometry_scale: float = 1.02
+    odometry_turned_deg: float = 1.0
+    odometry_sd_m: float = 0.004
 
 
 class NmeaFeed:
-    """Sentences of a compass (HDG or HDM) and a depth sensor (DPT: the vehicle's depth), paced by their line."""
+    """Sentences of a compass (HDG or HDM), a depth sensor (DPT: the vehicle's depth) and perhaps a velocity log (DVPDL).
+
+    They share one line, which paces them.
+    """
 
     def __init__(
         self,
@@ -52,6 +61,9 @@ class NmeaFeed:
         self._options = options
         self._line = line or Line(options.baud)
         self._is_stuck = is_stuck
+        self._log_rng = rng.spawn(1)[0] if options.odometry_hz else rng
+        self._logged: tuple[int, Place] | None = None
+        self._next_log_ns = 0
         self._said: dict[str, bytes] = {}
         self._next_heading_ns = 0
         self._next_depth_ns = int(SECOND_NS / options.heading_hz / 2)
@@ -64,13 +76,36 @@ class NmeaFeed:
         if t_ns >= self._next_depth_ns:
             self._next_depth_ns = t_ns + int(SECOND_NS / self._options.depth_hz)
             self._say(t_ns, "depth")
+        if self._options.odometry_hz and t_ns >= self._next_log_ns:
+            self._next_log_ns = t_ns + int(SECOND_NS / self._options.odometry_hz)
+            self._say(t_ns, "odometry")
         return self._line.take(t_ns)
 
-    def _say(self, t_ns: int, what: Literal["heading", "depth"]) -> None:
+    def _say(self, t_ns: int, what: Literal["heading", "depth", "odometry"]) -> None:
         if what not in self._said or not self._is_stuck(t_ns):
             place = self._where(t_ns)
-            self._said[what] = self._heading(place.heading_rad) if what == "heading" else self._depth(place.depth_m)
+            match what:
+                case "heading":
+                    self._said[what] = self._heading(place.heading_rad)
+                case "depth":
+                    self._said[what] = self._depth(place.depth_m)
+                case _:
+                    self._said[what] = self._odometry(t_ns, place)
         self._line.send(t_ns, self._said[what])
+
+    def _odometry(self, t_ns: int, place: Place) -> bytes:
+        """Return the way since the last one, in the body axes of now: ahead and to starboard."""
+        before_ns, before = self._logged or (t_ns, place)
+        self._logged = t_ns, place
+        options = self._options
+        east_m, north_m = place.x_m - before.x_m, place.y_m - before.y_m
+        towards = place.heading_rad + radians(options.odometry_turned_deg)
+        ahead_m = options.odometry_scale * (east_m * sin(towards) + north_m * cos(towards))
+        right_m = options.odometry_scale * (east_m * cos(towards) - north_m * sin(towards))
+        noise = options.odometry_sd_m * self._log_rng.standard_normal(2)
+        dt_us = (t_ns - before_ns) // 1000
+        body = f"DVPDL,{t_ns // 1000},{dt_us},0,0,0,{ahead_m + noise[0]:.4f},{right_m + noise[1]:.4f},0,100"
+        return sentence(body)
 
     def _heading(self, heading_rad: float) -> bytes:
         options = self._options

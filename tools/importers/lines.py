@@ -8,7 +8,7 @@ from typing import Final
 from config.schema import Feed, Quantity, Site
 from drivers.decoders import FEEDS, Decoder, feed_decoder
 from drivers.guess import guess_columns
-from drivers.readings import Altitude, Depth, Heading, Reading
+from drivers.readings import Altitude, Depth, Heading, Odometry, Reading
 from drivers.records import Json
 from drivers.tritech.framing import Deframer, Frame
 from drivers.tritech.headdata import HeadData, decode_head_data
@@ -18,7 +18,12 @@ from tools.importers.capture import Captured
 SONAR_DRIVER: Final = "tritech"
 _SAMPLE_BYTES: Final = 16 << 10
 """So much of a line is kept to find out what its columns are."""
-QUANTITIES: Final[dict[type[Reading], Quantity]] = {Heading: "heading", Depth: "depth", Altitude: "altitude"}
+QUANTITIES: Final[dict[type[Reading], Quantity]] = {
+    Heading: "heading",
+    Depth: "depth",
+    Altitude: "altitude",
+    Odometry: "odometry",
+}
 
 
 class LineProbe:
@@ -118,7 +123,8 @@ class _FeedProbe:
 
 
 def _listener(driver: str, checksum: str, settings: dict[str, str]) -> Decoder:
-    everything = list(QUANTITIES.values())
+    # An autopilot always reckons its way, with or without an instrument for it: the operator must say so.
+    everything = [each for each in QUANTITIES.values() if each != "odometry" or driver == "nmea"]
     feed = Feed.model_validate({"driver": driver, "checksum": checksum, "provides": everything, **settings})
     return feed_decoder(feed, Site())
 

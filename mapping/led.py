@@ -1,0 +1,50 @@
+"""Where odometry led: what it tells of a place that walls alone do not."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mapping.prior import Hint, Prior
+from mapping.register import Match
+from mapping.values import Displacement, Pose
+
+LED_SD_M = 0.1
+"""Least uncertainty of odometry from one scan to the next."""
+LED_MARGIN, LED_OVERLAP, LED_FIT = 3.0, 0.2, 0.45
+"""Walls must only not speak against a place that is known without them."""
+SLIDES = 0.12
+"""Information along the weakest axis (0.5 is the most) below which walls are not asked where along it a scan was made:
+wherever smooth walls lie on smooth walls, what differs least is the scan that did not move."""
+
+
+def led(moved: Sequence[Displacement | None], turn_rad: float, *, back: bool, reach_m: float) -> Hint | None:
+    """Join what odometry tells of the ways from a station to a scan, in map axes; None where it does not tell all.
+
+    ``turn_rad`` is how far the map is turned from the compass at the station; ``back`` tells that the scan was first.
+    """
+    told = [each for each in moved if each is not None]
+    sd_m = sum(each.sd_m for each in told)
+    if len(told) < len(moved) or not told or sd_m > reach_m / 2.0:
+        return None
+    sign = -1.0 if back else 1.0
+    x_m, y_m = sign * sum(each.dx_m for each in told), sign * sum(each.dy_m for each in told)
+    sin, cos = math.sin(turn_rad), math.cos(turn_rad)
+    return Hint(cos * x_m + sin * y_m, cos * y_m - sin * x_m, sd_m, LED_SD_M)
+
+
+def along(match: Match, prior: Prior) -> Match:
+    """Put a scan that walls leave free to slide where odometry led, along the way in which it could slide."""
+    if not prior.is_led or match.hold >= SLIDES:
+        return match
+    axis = np.array([math.sin(match.weak_rad), math.cos(match.weak_rad)])
+    short_m = float((np.array([prior.x_m, prior.y_m]) - [match.pose.x_m, match.pose.y_m]) @ axis)
+    x_m, y_m = np.array([match.pose.x_m, match.pose.y_m]) + short_m * axis
+    across = np.eye(3)
+    across[:2, :2] -= np.outer(axis, axis)
+    covariance = across @ match.covariance @ across
+    covariance[:2, :2] += prior.reach_m**2 * np.outer(axis, axis)
+    return replace(match, pose=Pose(float(x_m), float(y_m), match.pose.heading_rad), covariance=covariance)
