@@ -17,19 +17,6 @@ FAINT_BEHIND: Final = 10.0 * COUNTS_A_DB
 """... and a narrower one behind the walls beside it, fainter than walls usually are by this, is none."""
 BREAK_M: Final = 0.15
 BREAK_SLOPE: Final = 3.0
-
-Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True)
-class Seen:
-    """Beams in order of bearing, ``(n,)`` each: direction, range and level (counts above the floor) of their peaks."""
-
-    bearing_rad: Floats
-    range_m: Floats
-    level: Floats
-
-
 NEIGHBOUR_RAD: Final = math.radians(30.0)
 """Walls seen within this on either side say something about a beam."""
 NEAR_M: Final = 0.2
@@ -42,6 +29,37 @@ BEFORE_M: Final = 0.3
 WIDEST_RAD: Final = math.radians(30.0)
 AS_LOUD: Final = 8.0 * COUNTS_A_DB
 """A wall that is no fainter than beside by more than this is not hidden."""
+ON_M: Final = 0.4
+"""A wall may go on straight so far from where it is sure ..."""
+BESIDE_M: Final = 0.06
+"""... in beams that have an echo within this of its line ..."""
+ASIDE_M: Final = 0.12
+"""... and of which the line through the beams lies within this of it."""
+FIRM_OF: Final = 4
+FIRM_LEAST: Final = 3
+FIRM_M: Final = 0.04
+"""A wall is firm where so many of so many beams on one side see it within this."""
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """Bin and step of beams, whether they close a circle, and how far each one's peak is behind its wall, ``(n,)``."""
+
+    bin_m: float
+    step_rad: float
+    closed: bool
+    longer_m: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """Beams in order of bearing, ``(n,)`` each: direction, range and level (counts above the floor) of their peaks."""
+
+    bearing_rad: Floats
+    range_m: Floats
+    level: Floats
 
 
 def sides(sure: NDArray[np.bool_], reach: int, *, closed: bool) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -72,6 +90,48 @@ def expected_m(bearing_rad: Floats, wall: Floats, sure: NDArray[np.bool_], step_
             met = np.where((side >= 0) & (inverse > 0.0), 1.0 / inverse, np.inf)
         nearest = np.fmin(nearest, met)
     return np.where(np.isfinite(nearest), nearest, np.nan)
+
+
+def continued_m(seen: Seen, excess: Floats, sure: NDArray[np.bool_], wall: Floats, frame: Frame) -> Floats:
+    """Range ``(n,)`` of unsure beams in which the wall beside them goes on, nan elsewhere.
+
+    Straight on from the last firm beam on one side, for ``ON_M`` at most and not behind the wall on the other side; the
+    beam has an echo there.  Where its own line lies elsewhere, through an opening, the wall does not go on.
+    """
+    base = firm(seen, sure, wall, closed=frame.closed)
+    inner = expected_m(seen.bearing_rad, wall, base, frame.step_rad, closed=frame.closed) + BESIDE_M
+    found, nearest = np.full(len(sure), np.nan), np.full(len(sure), ON_M)
+    for side in sides(base, max(1, int(NEIGHBOUR_RAD / frame.step_rad)), closed=frame.closed):
+        inverse = wall[side, 0] * np.sin(seen.bearing_rad) + wall[side, 1] * np.cos(seen.bearing_rad)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            met = np.where((side >= 0) & (inverse > 0.0) & ~sure, 1.0 / inverse, np.nan)
+        at = peak_near(excess, met, frame.bin_m)
+        there = np.where(at >= 0, (at + 0.5) * frame.bin_m - frame.longer_m, np.nan)
+        base_m, turn = seen.range_m[side], seen.bearing_rad - seen.bearing_rad[side]
+        apart = np.hypot(met * np.sin(turn), met * np.cos(turn) - base_m)
+        on = (
+            (np.abs(there - met) < BESIDE_M)
+            & (np.abs(seen.range_m - met) < ASIDE_M)
+            & (met < inner)
+            & (apart < nearest)
+        )
+        found, nearest = np.where(on, met, found), np.where(on, apart, nearest)
+    return found
+
+
+def firm(seen: Seen, sure: NDArray[np.bool_], wall: Floats, *, closed: bool) -> NDArray[np.bool_]:
+    """Whether sure beams' walls are also their neighbours' on one side, ``(n,)``: a corner's flash is not."""
+    agree = np.zeros((2, len(sure)), dtype=np.intp)
+    for k in range(1, FIRM_OF + 1):
+        for way, step in enumerate((k, -k)):
+            bearing = np.roll(seen.bearing_rad, step)
+            inverse = wall[:, 0] * np.sin(bearing) + wall[:, 1] * np.cos(bearing)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                same = np.roll(sure, step) & (np.abs(1.0 / inverse - np.roll(seen.range_m, step)) < FIRM_M)
+            if not closed:
+                same[(slice(None, k), slice(len(sure) - k, None))[way]] = False
+            agree[way] += same
+    return np.asarray(sure & (agree.max(axis=0) >= FIRM_LEAST))
 
 
 def faint_behind(

@@ -17,9 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.schema import Map
-from mapping.between import NEIGHBOUR_RAD, Seen, expected_m, faint_behind, peak_near, sides, veils
+from mapping.between import NEIGHBOUR_RAD, Frame, Seen, continued_m, expected_m, faint_behind, peak_near, sides, veils
 from mapping.clutter import SMOOTH_M, deaf_m, floor_of, lobe_weights, rings_of, smoothed, without_ringing
 from mapping.contour import LOUD, trace
+from mapping.lean import Line, late_m, nearer_m
 from mapping.lines import Fit, fit_walls
 from mapping.mirror import Heard, images
 from mapping.peaks import centre_m, longer_m, snap, width_of
@@ -38,8 +39,12 @@ PEAK_SD_M: Final = 0.012
 """Standard deviation of a wall met squarely ..."""
 SLANT_SD: Final = 0.6
 """... and part of half its echo's length where it is met at a slant, which speckle moves it by."""
+LATE_SD: Final = 0.25
+"""... and of what the power of a leaning wall's echo is late."""
 OFF_SD: Final = 3.0
 """A beam farther than this from the wall that its neighbours see is not of it."""
+ON_SD_M: Final = 0.04
+"""Standard deviation of a wall that goes on straight from where it is sure, as into a corner."""
 VAGUE_SD_M: Final = 0.15
 """Least standard deviation of a vague return: it helps to place a scan, and draws no wall."""
 
@@ -76,6 +81,17 @@ class Peaks:
     sure: Flags
     heard: Flags
     expected_m: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """Ranges at peaks, ``(n,)`` each, before beams are settled onto the walls of ``fit``."""
+
+    range_m: Floats
+    heard: Flags
+    sure: Flags
+    fit: Fit
+    sd_m: Floats
 
 
 def pick(scan: Scan, config: Map) -> Returns:
@@ -132,35 +148,53 @@ def peaks_along(beams: Beams) -> Peaks:
             beams = replace(beams, excess=excess * weights)
             line = trace(beams.excess, bin_m, step, closed=closed)
     at = snap(beams.excess, line.bins, bin_m)
-    centre = centre_m(beams.echoes, beams.floor, at, bin_m)
-    range_m = centre - longer_m(centre, beams.half_height_rad)
-    heard, sure = judge(beams, at, range_m, line.joined)
-    fit, sd_m = walls_of(beams, range_m, heard)
-    return settle(beams, Peaks(at, range_m, sd_m, sure, heard, range_m), fit)
+    found = measure(beams, at, line.joined, np.zeros(len(at)), np.zeros(len(at)))
+    seen = Line(found.range_m, found.heard, found.fit.slope)
+    late = late_m(beams.echoes, beams.floor, bin_m, seen, beams.half_beam_rad)
+    if late.any():
+        found = measure(beams, at, line.joined, late, nearer_m(seen, late))
+    return settle(beams, Peaks(at, found.range_m, found.sd_m, found.sure, found.heard, found.range_m), found.fit)
 
 
-def judge(beams: Beams, at: NDArray[np.intp], range_m: Floats, joined: Flags) -> tuple[Flags, Flags]:
+def measure(beams: Beams, at: NDArray[np.intp], joined: Flags, late: Floats, nearer: Floats) -> Measured:
+    """Measure ranges at the peaks ``at``, of walls whose echoes are ``late`` and ``nearer`` for their lean."""
+    centre = centre_m(beams.echoes, beams.floor, at, beams.bin_m, late)
+    range_m = centre - longer_m(centre, beams.half_height_rad, late) + nearer
+    heard, sure = judge(beams, at, range_m, joined, late)
+    fit, sd_m = walls_of(beams, range_m, heard, late)
+    return Measured(range_m, heard, sure, fit, sd_m)
+
+
+def judge(beams: Beams, at: NDArray[np.intp], range_m: Floats, joined: Flags, late: Floats) -> tuple[Flags, Flags]:
     """Tell which beams are heard, and which of them have a clear place on a line that goes on."""
     level = beams.excess[np.arange(len(at)), at]
     around = np.median([np.roll(level, k) for k in (-2, -1, 0, 1, 2)], axis=0)
-    bend = np.abs(np.roll(range_m, 1) - 2.0 * range_m + np.roll(range_m, -1))
+    bend = np.abs(np.roll(range_m, 1) - 2.0 * range_m + np.roll(range_m, -1)) * squareness(beams, range_m)
     if not beams.closed:
         bend[[0, -1]] = 0.0
-    wide = width_of(beams.excess, at) * beams.bin_m > WIDE_M
-    heard = joined & (around > FAINT) & (bend < 2.0 * ROUGH_M)
-    sure = heard & (bend < ROUGH_M) & ~wide
+    wide = width_of(beams.excess, at) * beams.bin_m > WIDE_M + 2.0 * late
+    heard = joined & (around > FAINT) & (bend < 2.0 * ROUGH_M + late)
+    sure = heard & (bend < ROUGH_M + late) & ~wide
     sure &= long_enough(sure, range_m, beams.step_rad, closed=beams.closed)
     return heard & long_enough(heard, range_m, beams.step_rad, closed=beams.closed), sure
 
 
-def walls_of(beams: Beams, range_m: Floats, heard: Flags) -> tuple[Fit, Floats]:
+def squareness(beams: Beams, range_m: Floats) -> Floats:
+    """Cosine ``(n,)`` of the incidence at which a line is met: errors along the range move a wall less at a slant."""
+    after = np.diff(range_m, append=range_m[0] if beams.closed else range_m[-1]) / beams.step_rad
+    before = np.roll(after, 1)
+    slope = np.where(after * before > 0.0, np.minimum(np.abs(after), np.abs(before)), 0.0)
+    return np.asarray(range_m / np.maximum(np.hypot(range_m, slope), 1e-6))
+
+
+def walls_of(beams: Beams, range_m: Floats, heard: Flags, late: Floats) -> tuple[Fit, Floats]:
     """Fit walls to the beams that are heard; give each beam's own standard deviation, which grows with the slant."""
     seen = np.where(heard, range_m, np.nan)
     sd_m = np.full(len(seen), 2.0 * PEAK_SD_M)
     for _ in range(2):
         fit = fit_walls(beams.bearing_rad, seen, sd_m, beams.step_rad, closed=beams.closed)
         slope = np.where(np.isfinite(fit.slope), np.abs(fit.slope), 1.0)
-        sd_m = np.hypot(PEAK_SD_M, SLANT_SD * slope * beams.half_beam_rad)
+        sd_m = np.hypot(PEAK_SD_M + LATE_SD * late, SLANT_SD * slope * beams.half_beam_rad)
     return fit, sd_m
 
 
@@ -175,7 +209,14 @@ def settle(beams: Beams, peaks: Peaks, fit: Fit) -> Peaks:
     of_wall &= ~faint_behind(seen, of_wall, fit.wall, beams.step_rad, closed=beams.closed)
     range_m = np.where(of_wall, fit.range_m, peaks.range_m)
     sd_m = np.where(of_wall, fit.sd_m, np.maximum(peaks.sd_m, VAGUE_SD_M))
+    frame = Frame(beams.bin_m, beams.step_rad, beams.closed, (peaks.bins + 0.5) * beams.bin_m - peaks.range_m)
+    seen = replace(seen, range_m=range_m)
+    on_m = continued_m(seen, beams.excess, of_wall, fit.wall, frame)
+    goes_on = np.isfinite(on_m)
+    range_m, sd_m = np.where(goes_on, on_m, range_m), np.where(goes_on, ON_SD_M, sd_m)
+    peaks = replace(peaks, heard=peaks.heard | goes_on)
     expected = expected_m(beams.bearing_rad, fit.wall, of_wall, beams.step_rad, closed=beams.closed)
+    of_wall = of_wall | goes_on
     return replace(peaks, range_m=range_m, sd_m=sd_m, sure=of_wall, expected_m=expected)
 
 

@@ -8,6 +8,7 @@ evidence.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,6 +20,7 @@ from mapping.graph import put_at, seen_from
 from mapping.grid import Canvas
 from mapping.hypotheses import ASKED, lies
 from mapping.led import along, led
+from mapping.levels import levels_of
 from mapping.pieces import Pieces
 from mapping.prior import Hint, Prior, agreed
 from mapping.sight import Sight
@@ -74,8 +76,18 @@ class Stations:
         return False
 
     def grid(self) -> Grid:
-        """Draw the evidence of the stations of the map."""
-        return self._canvas.render([(self._told[k].pose, self._sights[k].evidence) for k in self._map])
+        """Draw the evidence of the stations of the map that show the same plan as the first."""
+        plans = self.plans()
+        return self._draw(plans[0] if plans else ())
+
+    def plans(self) -> list[list[int]]:
+        """Sort the stations of the map by the plan that they show: wells taper."""
+        cells = [self._canvas.cells(self._told[k].pose, self._sights[k].evidence) for k in self._map]
+        depths_m = [self._sights[k].scan.depth_m for k in self._map]
+        return [[self._map[k] for k in plan] for plan in levels_of(depths_m, cells, self._config)]
+
+    def _draw(self, stations: Sequence[int]) -> Grid:
+        return self._canvas.render([(self._told[k].pose, self._sights[k].evidence) for k in stations])
 
     def _place(self, i: int) -> Station:
         """Grow the piece that a scan fits, or begin one with it."""

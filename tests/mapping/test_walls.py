@@ -8,8 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from mapping.between import Seen, expected_m, faint_behind, peak_near, sides, veils
+from mapping.between import Frame, Seen, continued_m, expected_m, faint_behind, firm, peak_near, sides, veils
 from mapping.clutter import deaf_m, lobe_weights, smoothed, without_ringing
+from mapping.lean import Line, late_m, nearer_m
 from mapping.lines import Fit, fit_walls
 from mapping.mirror import Heard, images
 from mapping.peaks import CENTRE_M, TAIL_M, centre_m, longer_m
@@ -159,3 +160,68 @@ def test_the_peak_nearest_to_an_expected_place_is_taken() -> None:
     excess[1, 140] = 50.0
     at = peak_near(excess, np.array([2.01, 2.0, np.nan]), BIN_M)
     np.testing.assert_array_equal(at, [100, -1, -1])
+
+
+def leaning_echoes(lean: float, range_m: float = 2.0) -> np.ndarray:
+    """Echoes of a round well, in counts, whose wall recedes by ``lean`` for each metre of depth."""
+    elevation = np.radians(np.linspace(-26.0, 26.0, 400))
+    met_m = range_m / (np.cos(elevation) - lean * np.sin(elevation))
+    facing = (np.cos(elevation) - lean * np.sin(elevation)) / math.hypot(1.0, lean)
+    lobe = 0.75 * np.exp(-((np.degrees(np.arccos(np.minimum(facing, 1.0))) / 14.0) ** 2)) + 0.25 * facing**1.5
+    beam = 10.0 ** (-0.6 * (np.degrees(elevation) / 17.5) ** 2)
+    power, _ = np.histogram(met_m, np.arange(401) * BIN_M, weights=lobe * beam)
+    level = 150.0 + 31.875 * np.log10(np.maximum(power / power.max(), 1e-6))
+    speckle = np.random.default_rng(4).normal(0.0, 12.0, (200, 400))
+    return np.maximum(np.maximum(level, 0.0) + speckle, 15.0)
+
+
+def centres(echoes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Ranges of the first strong peaks' centres, without and with the lean that the echoes tell."""
+    floor, half_beam, half_height = np.full(400, 15.0), math.radians(1.5), math.radians(17.5)
+    at = (echoes > 130.0).argmax(axis=1)
+    plain = centre_m(echoes, floor, at, BIN_M)
+    plain -= longer_m(plain, half_height)
+    line = Line(plain, np.ones(200, dtype=bool), np.zeros(200))
+    late = late_m(echoes, floor, BIN_M, line, half_beam)
+    centre = centre_m(echoes, floor, at, BIN_M, late)
+    return plain, centre - longer_m(centre, half_height, late) + nearer_m(line, late)
+
+
+@pytest.mark.parametrize("lean", [0.35, 0.46, -0.46])
+def test_the_wall_of_a_well_is_measured_at_the_sonars_own_level(lean: float) -> None:
+    plain, leaning = centres(leaning_echoes(lean))
+    assert np.median(plain) < 1.93
+    assert np.median(leaning) == pytest.approx(2.0, abs=0.05)
+
+
+def test_an_upright_wall_does_not_lean() -> None:
+    plain, leaning = centres(leaning_echoes(0.0))
+    assert np.median(plain) == pytest.approx(2.0, abs=0.02)
+    np.testing.assert_array_equal(plain, leaning)
+
+
+def test_a_wall_goes_on_into_its_corner_where_there_is_an_echo() -> None:
+    sure = np.abs(np.diff(TRUE_M, append=TRUE_M[0])) < 1.0
+    corner = int(TRUE_M.argmax())
+    sure[corner - 2 : corner + 1] = False
+    seen = Seen(BEARING, np.where(sure, TRUE_M, TRUE_M + 0.08), np.full(200, 100.0))
+    frame = Frame(BIN_M, STEP_RAD, True, np.zeros(200))
+    on = continued_m(seen, room_echoes(), sure, fitted(TRUE_M).wall, frame)
+    told = np.isfinite(on)
+    assert told.sum() >= 2
+    assert not (told & sure).any()
+    assert on[told] == pytest.approx(TRUE_M[told], abs=0.06)
+    elsewhere = Seen(BEARING, np.where(sure, TRUE_M, TRUE_M + 1.0), np.full(200, 100.0))
+    assert np.isnan(continued_m(elsewhere, room_echoes(), sure, fitted(TRUE_M).wall, frame)).all()
+    assert np.isnan(continued_m(seen, np.zeros((200, 500)), sure, fitted(TRUE_M).wall, frame)).all()
+
+
+def test_a_flash_beside_a_corner_is_no_firm_wall() -> None:
+    range_m, sure = TRUE_M.copy(), np.ones(200, dtype=bool)
+    range_m[100] -= 0.3
+    fit = fitted(range_m)
+    wall = fit.wall.copy()
+    wall[100] *= TRUE_M[100] / range_m[100]
+    told = firm(Seen(BEARING, range_m, np.full(200, 100.0)), sure, wall, closed=True)
+    assert not told[100]
+    assert told.mean() > 0.9
