@@ -8,12 +8,13 @@ import json
 import signal
 import socket
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from subprocess import PIPE, Popen, TimeoutExpired
 from typing import Any, Final, Self
 
 from config.errors import LacunaError
+from drivers.records import Json
 
 _MAP_WAIT_S: Final = 120
 _STOP_S: Final = 5.0
@@ -26,7 +27,11 @@ class Crew:
     ZeroMQ ports are free ones, so that a demo runs beside a real daemon.
     """
 
-    def __init__(self, scratch: Path, folder: Path, site: str, speed: float) -> None:
+    def __init__(
+        self, scratch: Path, folder: Path, site: str, speed: float, devices: Mapping[str, Mapping[str, Json]]
+    ) -> None:
+        """Plan them; ``devices`` has the keys of ``sonar`` and ``feed`` that the emulated devices need."""
+        self._devices = devices
         self._scratch = scratch
         self._folder = folder
         self._site = site
@@ -107,8 +112,10 @@ class Crew:
                 f"name = {json.dumps(self._site)}",
                 "[sonar]",
                 f"port = {json.dumps(str(ports / 'sonar'))}",
+                *(f"{key} = {json.dumps(value)}" for key, value in self._devices["sonar"].items()),
                 "[[feed]]",
                 f"port = {json.dumps(str(ports / 'feed'))}",
+                *(f"{key} = {json.dumps(value)}" for key, value in self._devices["feed"].items()),
                 "[publish]",
                 f"port = {snapshots}",
                 f"request_port = {requests}",

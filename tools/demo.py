@@ -47,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
         scratch = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="lacuna-demo-")))
         folder = args.out.resolve() if args.out else scratch / "logs"
         make_folder(folder)
-        crew = stack.enter_context(Crew(scratch, folder, args.site, speed))
+        crew = stack.enter_context(Crew(scratch, folder, args.site, speed, options.configured(args)))
         crew.start(options.words(args), folder / "truth.json" if args.headless else None)
         return _headless(crew, folder, args.json) if args.headless else _watched(crew, bool(args.out))
 

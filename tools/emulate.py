@@ -8,15 +8,15 @@ import signal
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 
 from config.errors import LogError, UsageError
+from config.schema import Sonar
 from drivers.records import Json
 from tools.emulator import faults, options
 from tools.emulator.dive import Dive, DiveOptions
-from tools.emulator.head import HeadOptions
 from tools.emulator.record import record, write_jsonl
 from tools.emulator.serve import SPEEDS, Emulation
 from tools.emulator.site import SITES
@@ -28,9 +28,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.epilog = faults.__doc__
     options.add_arguments(parser)
-    parser.add_argument("--head", choices=("dst", "non-dst"), default="dst", help="family of the head (default: dst)")
-    parser.add_argument("--half-duplex", action="store_true", help="both sides on one wire, one ping a request")
-    parser.add_argument("--aux-hz", type=float, default=0.0, metavar="N", help="an echosounder on the head speaks")
     parser.add_argument("--speed", type=float, default=1.0, metavar="N", help="times real time (default: 1)")
     parser.add_argument("--folder", type=Path, metavar="DIR", help="where the ports' names go (default: a new folder)")
     parser.add_argument("--truth", type=Path, metavar="FILE", help="write where everything truly was (JSON)")
@@ -42,16 +39,14 @@ def run(args: argparse.Namespace) -> int:
     """Serve until Ctrl-C or SIGTERM, or record."""
     if not SPEEDS[0] <= args.speed <= SPEEDS[1]:
         raise UsageError(f"--speed must be from {SPEEDS[0]:g} to {SPEEDS[1]:g}")
-    if not 0.0 <= args.aux_hz <= 20.0:
-        raise UsageError("--aux-hz must be from 0 to 20")
-    head = HeadOptions(dst=args.head == "dst", replies_per_request=1 if args.half_duplex else 2, aux_hz=args.aux_hz)
-    chosen = replace(options.dive_options(args), head=head)
+    chosen = options.dive_options(args)
     return _record(args, chosen) if args.record else _serve(args, chosen)
 
 
 def _record(args: argparse.Namespace, chosen: DiveOptions) -> int:
     dive = Dive(SITES[args.site](), args.seed, chosen)
-    count = write_jsonl(record(dive), args.record)
+    sonar = Sonar.model_validate(options.configured(args)["sonar"])
+    count = write_jsonl(record(dive, sonar), args.record)
     if args.truth:
         _write_truth(truth_of(dive), args.truth)
     facts: dict[str, Json] = {"event": "recorded", "pieces": count, "stations": len(dive.vehicle.rests)}

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import select
 import signal
 import termios
+import threading
 import time
 import tty
 from collections.abc import Iterator
@@ -15,14 +17,19 @@ from subprocess import Popen
 
 import pytest
 
-from config.errors import InputError, PortError
+from config.errors import InputError, PortError, UsageError
 from config.schema import Feed, Site, Sonar
 from drivers.decoders import feed_decoder
 from drivers.readings import Depth, Heading, Reading
 from drivers.tritech.decoder import TritechDecoder
 from drivers.tritech.head import Head
+from tools.emulator import options
+from tools.emulator.dive import DiveOptions
+from tools.emulator.feeds import FeedOptions
+from tools.emulator.head import HeadOptions
 from tools.emulator.ptys import FolderLock, PtyPort
 from tools.emulator.serve import Emulation, spawn
+from tools.probe import probe
 
 SPEED = 8.0
 
@@ -164,3 +171,46 @@ def test_port_is_raw_and_forgets_what_nobody_reads(tmp_path: Path) -> None:
         port.unplug()
     port.unplug()
     assert not (tmp_path / "sonar").is_symlink()
+
+
+def test_a_host_at_another_rate_hears_noise_and_a_probe_finds_the_right_one(tmp_path: Path) -> None:
+    devices = DiveOptions(head=HeadOptions(baud=57600, centring_s=0.5), feed=FeedOptions(baud=19200))
+    emulation = Emulation(tmp_path, options=devices)
+    is_over = threading.Event()
+    serving = threading.Thread(target=emulation.serve, args=(is_over.is_set,))
+    serving.start()
+    try:
+        for name, baud, driver in (("sonar", 57600, "tritech"), ("feed", 19200, "nmea")):
+            tried = probe(str(tmp_path / name), 1.3)
+            understood = [each for each in tried if each.heard]
+            assert [(each.baud, each.heard[0].driver) for each in understood] == [(baud, driver)]
+            assert not any(each.asked for each in tried)
+    finally:
+        is_over.set()
+        serving.join()
+        emulation.close()
+
+
+@pytest.mark.parametrize(
+    ("words", "sonar", "feed"),
+    [
+        ([], {"baud": 115200, "head_type": "dst"}, {"baud": 4800, "provides": ["heading", "depth"]}),
+        (
+            ["--head", "non-dst", "--sonar-baud", "57600", "--odometry"],
+            {"baud": 57600, "head_type": "non-dst"},
+            {"baud": 9600, "provides": ["heading", "depth", "odometry"]},
+        ),
+    ],
+)
+def test_what_was_chosen_reaches_another_command_and_the_configuration(
+    words: list[str], sonar: dict[str, object], feed: dict[str, object]
+) -> None:
+    parser = argparse.ArgumentParser()
+    options.add_arguments(parser)
+    args = parser.parse_args([*words, "--half-duplex", "--aux-hz", "2"])
+    again = parser.parse_args(options.words(args))
+    assert options.dive_options(again) == options.dive_options(args)
+    assert options.dive_options(args).head.replies_per_request == 1
+    assert options.configured(again) == {"sonar": sonar, "feed": feed}
+    with pytest.raises(UsageError, match="--aux-hz must be from 0 to 20"):
+        options.dive_options(parser.parse_args(["--aux-hz", "50"]))

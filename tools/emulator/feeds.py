@@ -42,7 +42,7 @@ class FeedOptions:
 
 
 class NmeaFeed:
-    """Sentences of a compass (HDG or HDM), a depth sensor (DPT: the vehicle's depth) and perhaps a velocity log (DVPDL).
+    """Sentences of compass (HDG or HDM), depth sensor (DPT: the vehicle's depth) and perhaps velocity log (DVPDL).
 
     They share one line, which paces them.
     """

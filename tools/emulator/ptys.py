@@ -16,6 +16,9 @@ from config.errors import InputError, PortError
 _DEAF_NS: Final = 2_000_000_000
 _MOST_WAITING: Final = 1 << 20
 _HELD: Final = 2048
+_SPEEDS: Final = {
+    getattr(termios, f"B{baud}"): baud for baud in (4800, 9600, 19200, 38400, 57600, 115200, 230400, 460800, 921600)
+}
 
 
 class PtyPort:
@@ -25,9 +28,13 @@ class PtyPort:
     handed over for two seconds is dropped, so that the next host hears the present.
     """
 
-    def __init__(self, link: Path) -> None:
-        """Open the pair and name the host's side ``link``; raises InputError where the link cannot be made."""
+    def __init__(self, link: Path, baud: int = 115200) -> None:
+        """Open the pair and name the host's side ``link``; raises InputError where the link cannot be made.
+
+        ``baud`` is the device's rate, and the line's until a host sets another.
+        """
         self.link = link
+        self._baud = baud
         self._device = self._host = -1
         self._waiting = bytearray()
         self._handed_ns = 0
@@ -45,12 +52,18 @@ class PtyPort:
         self._device, self._host = pty.openpty()
         # The host's side stays open here as well: its raw mode would be reset at the last close.
         tty.setraw(self._host, termios.TCSANOW)
+        self._set_speed()
         os.set_blocking(self._device, False)
         try:
             _link(self.link, os.ttyname(self._host))
         except OSError as error:
             self._close_pair()
             raise InputError(f"cannot make {self.link}: {error.strerror}; choose another folder") from None
+
+    @property
+    def host_baud(self) -> int:
+        """Rate at which the host listens and speaks; the device's own where it cannot be told."""
+        return _SPEEDS.get(termios.tcgetattr(self._host)[5], self._baud) if self.is_there else self._baud
 
     def unplug(self) -> None:
         """Hang up on the host and take the name away; harmless when repeated."""
@@ -85,6 +98,13 @@ class PtyPort:
         if self._waiting and (now_ns - self._handed_ns > _DEAF_NS or len(self._waiting) > _MOST_WAITING):
             self._waiting.clear()
             termios.tcflush(self._host, termios.TCIFLUSH)
+
+    def _set_speed(self) -> None:
+        code = next((code for code, baud in _SPEEDS.items() if baud == self._baud), None)
+        if code is not None:
+            attributes = termios.tcgetattr(self._host)
+            attributes[4] = attributes[5] = code
+            termios.tcsetattr(self._host, termios.TCSANOW, attributes)
 
     def _hand_over(self) -> int:
         # Beyond what the terminal itself holds, the kernel keeps bytes where a flush does not find them.

@@ -14,6 +14,7 @@ from typing import Final
 
 from drivers.records import Json
 from tools.emulator.dive import Dive, DiveOptions
+from tools.emulator.faults.bytewise import misread
 from tools.emulator.faults.script import Port
 from tools.emulator.ptys import FolderLock, PtyPort
 from tools.emulator.site import SITES
@@ -50,8 +51,9 @@ class _Clock:
 class Emulation:
     """Serves a dive: ``<folder>/sonar`` is the head, ``<folder>/feed`` compass and depth.
 
-    Lines, pings, vehicle and sensors all run ``speed`` times as fast as real ones.  ``tell`` gets what happens:
-    ``ready`` with the ports, ``station`` at each rest, ``done`` after the last one, where the vehicle stays, and
+    Lines, pings, vehicle and sensors all run ``speed`` times as fast as real ones.  A host that sets its side to
+    another rate than the device's hears what receivers make of that.  ``tell`` gets what happens: ``ready`` with the
+    ports, ``station`` at each rest, ``done`` after the last one, where the vehicle stays, and
     ``fault`` when something goes wrong by the dive's script.
     """
 
@@ -72,9 +74,9 @@ class Emulation:
         self._lock = FolderLock(folder)
         with ExitStack() as undo:
             undo.callback(self._lock.release)
-            self.sonar = PtyPort(folder / "sonar")
+            self.sonar = PtyPort(folder / "sonar", self.dive.options.head.baud)
             undo.callback(self.sonar.unplug)
-            self.feed = PtyPort(folder / "feed")
+            self.feed = PtyPort(folder / "feed", self.dive.options.feed.baud)
             undo.pop_all()
         self._ports: dict[Port, PtyPort] = {"sonar": self.sonar, "feed": self.feed}
         self._told_spells = 0
@@ -99,13 +101,14 @@ class Emulation:
         self._lock.release()
 
     def _round(self, clock: _Clock) -> None:
+        bauds = {"sonar": self.dive.options.head.baud, "feed": self.dive.options.feed.baud}
         if asked := self.sonar.read():
-            self.dive.push(clock.t_ns, asked)
+            self.dive.push(clock.t_ns, misread(asked, self.sonar.host_baud, bauds["sonar"]))
         self.feed.read()  # nothing listens at the sensors' end
         from_sonar, from_feed = self.dive.tick(clock.t_ns)
         self._hang_up(clock.t_ns)
-        self.sonar.write(clock.real_ns, from_sonar)
-        self.feed.write(clock.real_ns, from_feed)
+        self.sonar.write(clock.real_ns, misread(from_sonar, bauds["sonar"], self.sonar.host_baud))
+        self.feed.write(clock.real_ns, misread(from_feed, bauds["feed"], self.feed.host_baud))
         if self.dive.advance(clock.t_ns):
             self._report(clock.t_ns)
 
