@@ -14,6 +14,8 @@ _SHORT_BEFORE_SINGLE: Final = 4
 _TICK_S: Final = 640e-9
 _SLOWER: Final = 1.1
 _QUICKER: Final = 0.95
+_TRY_AGAIN: Final = 300
+"""Pings after which an attempt that did not help is made again: a link that was busy then may be only slow now."""
 
 
 class RequestLoop:
@@ -39,6 +41,7 @@ class RequestLoop:
         self._is_excused = self._is_half_duplex = False
         self._is_ahead = self._has_tried = False
         self._before_s = 0.0
+        self._since_try = 0
         self._waits_from_ns = 0
         self._limit_ns = _MOTOR_WAKES_NS
 
@@ -123,12 +126,14 @@ class RequestLoop:
         if not self.pace.is_full or ping_s is None or self._is_half_duplex:
             return
         self._is_excused = False
-        if self._has_tried:
+        self._since_try += 1
+        if self._has_tried and (self._is_ahead or self._since_try < _TRY_AGAIN):
             if self._is_ahead and self._before_s and ping_s > _QUICKER * self._before_s:
                 self._is_ahead = False
             self._before_s = 0.0
         elif ping_s > _SLOWER * self.limits.ping_s:
             self._has_tried = self._is_ahead = True
+            self._since_try = 0
             self._before_s = ping_s
             self.pace.forget()
 

@@ -18,6 +18,7 @@ from drivers.tritech.framing import Deframer
 from drivers.tritech.head import Head
 from drivers.tritech.headdata import HeadData, decode_head_data
 from drivers.tritech.ids import MessageId
+from drivers.tritech.requests import RequestLoop
 from drivers.tritech.settings import head_command, matches
 from tools.emulator.head import Head as EmulatedHead
 from tools.emulator.head import HeadOptions, Sounding
@@ -257,3 +258,18 @@ def test_a_slow_head_is_not_asked_more_often() -> None:
     assert ping_s is not None
     assert water.host.limits.ruling(ping_s) == "other"
     assert water.host._requests.owed <= 2
+
+
+def test_a_busy_link_that_gained_nothing_is_asked_ahead_again_later() -> None:
+    loop, t_ns = RequestLoop(), 0
+    loop.begin(head_command(Sonar()).parameters, 115200)
+    ahead: list[bool] = []
+    for _ in range(400):
+        t_ns += 100 * MS  # twice as slow as the line allows, whatever is asked
+        loop.asked(t_ns)
+        loop.answered(t_ns)
+        ahead.append(loop.is_ahead)
+    tries = [at for at, (before, now) in enumerate(pairwise(ahead)) if now and not before]
+    assert len(tries) == 2
+    assert tries[1] - tries[0] > 250
+    assert sum(ahead) < 60
