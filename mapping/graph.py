@@ -32,6 +32,12 @@ LOOSE = 1e-4
 Floats = NDArray[np.float64]
 
 
+SWAY_RAD = math.radians(0.5)
+"""Heading of a scan against that of its walls: a vehicle at rest sways, and a scan has one heading."""
+SCALE = 0.01
+"""All ranges may be too long or too short by this share, with the speed of sound: no tie between stations tells."""
+
+
 @dataclass(frozen=True, slots=True)
 class Tie:
     """Where station ``other`` is in the axes of station ``one`` (x right, y ahead), and its ``(3, 3)`` information."""
@@ -62,6 +68,14 @@ class Solution:
         """Covariance ``(3, 3)`` of one station about the first."""
         at = 3 * self.stations.index(station)
         return self.covariance[at : at + 3, at : at + 3]
+
+    def stated(self, station: int) -> Floats:
+        """Covariance ``(3, 3)`` of one station about the first, with what no tie tells: sway, and the scale of all."""
+        first, pose = self.poses[0], self.poses[self.stations.index(station)]
+        dx, dy = pose.x_m - first.x_m, pose.y_m - first.y_m
+        swayed, scaled = np.array([dy, -dx, 1.0]) * SWAY_RAD, np.array([dx, dy, 0.0]) * SCALE
+        own = np.diag([0.0, 0.0, SWAY_RAD**2])
+        return np.asarray(self.of(station) + np.outer(swayed, swayed) + np.outer(scaled, scaled) + own)
 
     def between(self, one: int, other: int) -> Floats:
         """Covariance ``(3, 3)`` of the pose of ``other`` in the axes of ``one``."""

@@ -59,7 +59,7 @@ class Prior:
         if self.gaussian:
             away = rng.normal(0.0, self.reach_m, (n, 2))
         else:
-            radius, turn = self.reach_m * np.sqrt(rng.random(n)), rng.random(n) * 2.0 * math.pi
+            radius, turn = (self.reach_m + 2.0 * EDGE_M) * np.sqrt(rng.random(n)), rng.random(n) * 2.0 * math.pi
             away = np.stack([radius * np.cos(turn), radius * np.sin(turn)], axis=1)
         xy = away + np.array([self.x_m, self.y_m])
         if self.cloud is not None:

@@ -229,7 +229,7 @@ class Stations:
         told = {}
         for k in piece:
             station, pose = self._judged[k], put_at(moved, seen_from(first, self._pieces.pose(k)))
-            station = replace(station, pose=pose, covariance=solution.of(k), piece=number)
+            station = replace(station, pose=pose, covariance=solution.stated(k), piece=number)
             if k == piece[0]:
                 station = replace(station, covariance=origin(station.scan, self._config).covariance)
             if number:
