@@ -6,6 +6,7 @@ caught up.  ``python -m daemon.follow`` is started by the supervisor.
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from typing import Final
@@ -22,6 +23,8 @@ from drivers.records import Json, Record
 
 _LOOK_S: Final = 0.1
 _HEALTH_S: Final = 1.0
+_GIVES_WAY: Final = 5
+"""On a busy computer the acquisition goes first: the map can catch up, a serial line cannot wait."""
 
 
 class MapProcess:
@@ -111,6 +114,8 @@ class MapProcess:
 
 def main() -> int:
     """Follow the session that standard input names."""
+    os.nice(_GIVES_WAY)
+    os.nice(_GIVES_WAY)
     job = take_job()
     link = Link(job.link, "map", wait_s=2.0, heeds_term=False)
     try:

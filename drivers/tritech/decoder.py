@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
 
 from config.errors import FrameError
 from config.schema import Sonar
@@ -14,6 +18,21 @@ from drivers.tritech.framing import Deframer, Frame
 from drivers.tritech.headdata import PROFILER, Control, HeadData, HeadStatus, decode_head_data, echoes_of
 from drivers.tritech.ids import MessageId, name_of
 from drivers.tritech.settings import bow_angle_rad
+
+_MOST_KNOWN: Final = 64
+_ECHOES_AT: Final = 44
+_EMPTY: Final = 45
+"""Bytes of a reply without echoes."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Like:
+    """What pings share that were made with the same settings."""
+
+    head: HeadSettings
+    bin_m: float
+    sampling_ns: int
+    is_8_bit: bool
 
 
 class TritechDecoder:
@@ -33,6 +52,8 @@ class TritechDecoder:
         """What the last call completed, for the conversation with the head (`drivers.tritech.head`)."""
         self._frames: Counter[str] = Counter()
         self._refused: Counter[str] = Counter()
+        self._known: dict[bytes, _Like | str] = {}
+        self._bearings: dict[int, float] = {}
 
     @property
     def counters(self) -> Counters:
@@ -69,6 +90,34 @@ class TritechDecoder:
 
     def _ping(self, frame: Frame) -> Ping | str:
         """Ping of a frame, or the reason why there is none."""
+        data = frame.data
+        # Nearly all pings are like the one before, but for their bearing, their sweep code and their echoes.
+        key = data[7:17] + data[18:40] + data[42:44]
+        like = self._known.get(key)
+        if like is None:
+            like = self._read(frame)
+            if len(self._known) >= _MOST_KNOWN:
+                self._known.clear()
+            self._known[key] = like
+        if isinstance(like, str):
+            return like
+        position = int.from_bytes(data[40:42], "little")
+        if position >= units.TURN:
+            return "bearing"
+        bearing_rad = self._bearings.get(position)
+        if bearing_rad is None:
+            bearing_rad = self._bearings[position] = bow_angle_rad(position, self._sonar)
+        echoes = np.frombuffer(data, np.uint8, len(data) - _EMPTY, _ECHOES_AT)
+        return Ping(
+            t_ns=frame.t_ns - like.sampling_ns,
+            bearing_rad=bearing_rad,
+            bin_m=like.bin_m,
+            echoes=echoes if like.is_8_bit else echoes_of(decode_head_data(frame)),
+            head=like.head,
+        )
+
+    def _read(self, frame: Frame) -> _Like | str:
+        """Return what all pings share whose heads are as this one's, or why they cannot be used."""
         if frame.source != self._sonar.node:
             return "other_node"
         try:
@@ -78,13 +127,13 @@ class TritechDecoder:
         reason = _unusable(data)
         if reason is not None:
             return reason
-        echoes = echoes_of(data)
-        return Ping(
-            t_ns=frame.t_ns - units.sampling_ns(len(echoes), data.ad_interval),
-            bearing_rad=bow_angle_rad(data.bearing, self._sonar),
-            bin_m=units.bin_m(data.ad_interval, self._sonar.sound_speed_m_s),
-            echoes=echoes,
+        is_8_bit = Control.ADC_8_ON in data.control
+        bins = len(data.bins) * (1 if is_8_bit else 2)
+        return _Like(
             head=self._settings(data),
+            bin_m=units.bin_m(data.ad_interval, self._sonar.sound_speed_m_s),
+            sampling_ns=units.sampling_ns(bins, data.ad_interval),
+            is_8_bit=is_8_bit,
         )
 
     def _settings(self, data: HeadData) -> HeadSettings:
@@ -115,8 +164,6 @@ def _unusable(data: HeadData) -> str | None:
         return "motor_error"
     if data.device_type == PROFILER:
         return "profiler"
-    if data.bearing >= units.TURN:
-        return "bearing"
     if data.ad_interval == 0 or not data.bins:
         return "no_echoes"
     return None

@@ -81,6 +81,7 @@ class Deframer:
         self._before: list[int] = []
         self._newest_ns: int | None = None
         self._need = 0
+        self._sound_at = -1
         self._deadline_ns: int | None = None
 
     @property
@@ -139,16 +140,18 @@ class Deframer:
         at = self._seek(0, 0)
         while (held := len(self._buffer) - at) >= STAGES[0]:
             size = int(self._buffer[at + 1 : at + 5], 16) + 6
-            reason = self._flaw(at, size, held)
+            chunk = bisect_right(self._offsets, self._base + at) - 1
+            deadline_ns = self._times[chunk] + self._limit_ns(size)
+            reason = self._flaw(at, size, held, is_quick=self._times[-1] <= deadline_ns)
             if reason is not None:
                 self.bad[reason] += 1
                 at = self._seek(at, at + 1)
             elif held >= size:
-                frames.append(Frame(self._came(at), bytes(self._buffer[at : at + size])))
+                frames.append(Frame(self._came(at, chunk), bytes(self._buffer[at : at + size])))
                 at = self._seek(at + size, at + size)
             else:
-                self._need = min(next((stage for stage in STAGES if stage > held), size), size)
-                self._deadline_ns = self._time(at) + self._limit_ns(size)
+                self._need = min(STAGES[1] if held < STAGES[1] else STAGES[2] if held < STAGES[2] else size, size)
+                self._deadline_ns = deadline_ns
                 break
         self._drop(at)
         return frames
@@ -160,13 +163,23 @@ class Deframer:
         self.skipped += at - start
         return at
 
-    def _flaw(self, at: int, size: int, held: int) -> str | None:
-        start = bytes(self._buffer[at : at + min(held, size, STAGES[-1])])
-        is_quick = self._times[-1] - self._time(at) <= self._limit_ns(size)
-        reason = flaw(start, size) if is_quick else self._slow_flaw(at, start, size, held)
+    def _flaw(self, at: int, size: int, held: int, *, is_quick: bool) -> str | None:
+        if is_quick:
+            reason = self._quick_flaw(at, size, held)
+        else:
+            reason = self._slow_flaw(at, bytes(self._buffer[at : at + min(held, size, STAGES[-1])]), size, held)
         if reason is not None:
             return reason
         return "end" if held >= size and self._buffer[at + size - 1] != 0x0A else None
+
+    def _quick_flaw(self, at: int, size: int, held: int) -> str | None:
+        """Judge all bytes at once, and those of a frame that grows only until nothing more can speak against it."""
+        if self._sound_at == self._base + at:
+            return None
+        reason = flaw(self._buffer[at : at + min(held, size, STAGES[-1])], size)
+        if reason is None and held >= min(size, STAGES[-1]):
+            self._sound_at = self._base + at
+        return reason
 
     def _slow_flaw(self, at: int, start: bytes, size: int, held: int) -> str | None:
         """Judge stage by stage, as if the bytes came one by one, so that the reason is the same however they came."""
@@ -187,13 +200,14 @@ class Deframer:
     def _time(self, at: int) -> int:
         return self._times[bisect_right(self._offsets, self._base + at) - 1]
 
-    def _came(self, at: int) -> int:
+    def _came(self, at: int, chunk: int) -> int:
         """Return when the first bit of a byte came: so long before the end of its chunk as the bytes behind it took."""
-        index = bisect_right(self._offsets, self._base + at) - 1
-        last = index + 1 == len(self._offsets)
-        end = self._base + len(self._buffer) if last else self._offsets[index + 1]
-        t_ns = self._times[index]
-        return max(self._before[index], t_ns - (end - self._base - at) * self._wire_ns) if self._wire_ns else t_ns
+        t_ns = self._times[chunk]
+        if not self._wire_ns:
+            return t_ns
+        is_newest = chunk + 1 == len(self._offsets)
+        end = self._base + len(self._buffer) if is_newest else self._offsets[chunk + 1]
+        return max(self._before[chunk], t_ns - (end - self._base - at) * self._wire_ns)
 
     def _drop(self, count: int) -> None:
         del self._buffer[:count]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import IntEnum
+from functools import cache
 from typing import Final
 
 HOST: Final = 0xFF
@@ -36,6 +37,7 @@ They rewrite the head's memory.  Nothing in lacuna can build a frame with one of
 """
 
 
+@cache
 def name_of(message_id: int) -> str:
     """Name of a message for counters: ``head_data``, or ``id_57`` where the id has no name here."""
     try:

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from tools.bench import acquisition, garbage, kills, line_faults, load, ping_rate
+from tools.bench import acquisition, garbage, kills, line_faults, load, parser, ping_rate
 from tools.bench.figure import Figure, at_least, at_most
 from tools.bench.load import Source, pings, sentences
 from tools.cli import main
 
-TIMED = ("ready", "processor", "slowest", "ping to ping", "longest way back", "oldest byte")
+TIMED = ("ready", "processor", "slowest", "ping to ping", "longest way back", "oldest byte", "faster")
 """Figures that a busy machine spoils: they are not judged here."""
 
 
@@ -38,6 +38,13 @@ def test_faults_are_outlived(tmp_path: Path) -> None:
 
 def test_kills_lose_nothing_false(tmp_path: Path) -> None:
     assert_kept(list(kills.measure(tmp_path, 2, 30)))
+
+
+def test_reading_is_compared_where_there_is_something_to_compare_with() -> None:
+    figures = list(parser.measure(40))
+    assert figures[0].value > 0
+    assert "bluerobotics-ping" in figures[1].name
+    assert len(figures) in (2, 3)
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from tools.bench import garbage, kills, line_faults, load, ping_rate
+from tools.bench import garbage, kills, line_faults, load, parser, ping_rate
 from tools.bench.figure import Figure
 
 
@@ -24,6 +24,7 @@ class Extent:
     pings_s: float
 
 
+_MESSAGES: Final = 2000
 FULL: Final = Extent(garbage_bytes=10_000_000, faults=1000, kills=200, flips=400, load_s=20.0, pings_s=20.0)
 QUICK: Final = Extent(garbage_bytes=500_000, faults=60, kills=8, flips=60, load_s=4.0, pings_s=4.0)
 
@@ -33,6 +34,7 @@ def measure(extent: Extent) -> Iterator[Figure]:
     parts: dict[str, Callable[[Path], Iterator[Figure]]] = {
         "load": lambda folder: load.measure(folder, extent.load_s),
         "ping rate": lambda folder: ping_rate.measure(folder, extent.pings_s),
+        "parser": lambda _: parser.measure(_MESSAGES),
         "garbage": lambda folder: garbage.measure(folder, extent.garbage_bytes),
         "faults": lambda folder: line_faults.measure(folder, extent.faults),
         "kills": lambda folder: kills.measure(folder, extent.kills, extent.flips),
