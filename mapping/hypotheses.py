@@ -32,7 +32,7 @@ ACCEPT_SD_M = 0.3
 """... if it is so sure in every direction ..."""
 WITNESSES = 2
 """... and so many of its scans, each for itself, lie on known walls."""
-ACCEPT_OVERLAP, ACCEPT_FIT = 0.35, 0.68
+ACCEPT_OVERLAP, ACCEPT_FIT = 0.35, 0.35
 
 Floats = NDArray[np.float64]
 

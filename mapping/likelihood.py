@@ -1,7 +1,9 @@
 """How well a pose of a scan fits a reference: walls on walls, open water on open water, both ways round.
 
-Each side's wall points are scored in what the other side saw, in three states.  The scores of all points are averaged,
-and the mean counts as much as the points that err independently of each other.
+Each side's wall points are looked up in what the other side saw.  A point on a wall speaks for the pose, one in open
+water against it, and one where nothing is known says nothing.  How much a point says was learnt: poses of real scans
+were told apart from the best wrong ones by a conditional logit.  What is rare tells most: where a corner or clutter
+meets its like, rather than where two long walls meet, which they do in many a wrong place.
 """
 
 from __future__ import annotations
@@ -12,16 +14,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapping.prior import Prior
-from mapping.view import Field, Points, View
+from mapping.view import LEVEL_M, LEVELS, View
 
-SIGMA_M = 0.1
+SIGMA_M = 0.08
 """Width of a wall without annealing."""
+ROUGH, PLAIN = 0, 1
+ON_WALL = ((1.97, 2.06), (3.44, 0.86))
+"""What a point says on a wall: a rough or a plain one, where the wall is rough or plain."""
+BESIDE, BESIDE_M = (3.1, 0.02), 0.3
+"""What a rough or a plain point says beside a wall, fading so far from it."""
+IN_WATER, WATER_M = (-1.65, -4.12), 0.1
+"""What it says in open water, from so far from walls ..."""
+FAR_WATER, FAR_M = (-0.42, 1.17), 0.45
+"""... and what farther out is added: it may be a ghost."""
+FULL = 100.0
+"""Points of a full scan; more of them err together and say no more."""
 WITNESSES = 40.0
 """Independent points in a full scan: neighbouring returns share their errors, and walls repeat."""
 POINTS_A_WITNESS = 2.5
-OVERLAP_POWER = 0.5
-FEW = 0.1
-"""Share of known points below which dividing by it stops."""
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
@@ -39,56 +49,76 @@ class Likelihood:
 
     def __init__(self, scan: View, reference: View, prior: Prior) -> None:
         self._prior = prior
-        own, other = len(scan.points.xy_m), len(reference.points.xy_m)
-        # A map has more walls than one scan can see; those it does not see are neutral and must not dilute the others.
-        share = max(1.0, other / max(own, 1))
-        self._forth = _Side(scan.points, reference.field, 0.5)
-        self._back = _Side(reference.points, scan.field, 0.5 * share)
-        self.witnesses = min(WITNESSES, float(scan.points.trust.sum()) / POINTS_A_WITNESS)
+        points = max(FULL, float(scan.points.trust.sum()))
+        self._forth = _Side(scan, reference, 0.5 / points)
+        self._back = _Side(reference, scan, 0.5 / points)
+        self.witnesses = WITNESSES
 
     def log_posterior(self, poses: Floats, sigma_m: float = SIGMA_M) -> Floats:
         """Log-posterior ``(n,)`` of poses ``(n, 3)``, up to a constant."""
         return self.witnesses * self.score(poses, sigma_m) + self._prior.log_density(poses)
 
     def score(self, poses: Floats, sigma_m: float = SIGMA_M) -> Floats:
-        """Mean score of the points, both ways round, ``(n,)``.
-
-        Points that fall where nothing is known score nothing, so the sum draws scans to where they overlap most:
-        along a tunnel, to no motion at all.  Dividing by a power of the share that is known takes most of that away.
-        """
-        told = self._forth.sums(_outward(poses), sigma_m) + self._back.sums(_inward(poses), sigma_m)
-        total, known = told.real.astype(np.float64), told.imag.astype(np.float64)
-        return np.asarray(total / ((known + FEW) / (1.0 + FEW)) ** OVERLAP_POWER, dtype=np.float64)
+        """Log-likelihood a witness ``(n,)`` of poses ``(n, 3)``, against having seen nothing in common."""
+        told = self._forth.sums(*_outward(poses), sigma_m) + self._back.sums(*_inward(poses), sigma_m)
+        return told.astype(np.float64)
 
 
 class _Side:
-    """One side's points, looked up in what the other side saw: score and known share in one look, as real and imag."""
+    """One side's points, rough ones first, looked up in what the other side saw."""
 
-    def __init__(self, points: Points, field: Field, share: float) -> None:
-        self._field = field
-        self._xy1 = np.concatenate([points.xy_m.T, np.ones((1, len(points.xy_m)))]).astype(np.float32)
-        self._weight = (share * points.weight).astype(np.complex64)
-        self._tables: dict[float, NDArray[np.complex64]] = {}
+    def __init__(self, points_of: View, seen_by: View, share: float) -> None:
+        points, field = points_of.points, seen_by.field
+        plain = np.isfinite(points.normal_rad)
+        order = np.argsort(plain, kind="stable")
+        self._rough = int((~plain).sum())
+        self._xy1 = np.concatenate([points.xy_m[order].T, np.ones((1, len(order)))]).astype(np.float32)
+        self._weight = (share * points.trust[order]).astype(np.float32)
+        self._codes, self._shape, self._cell_m = seen_by.codes, field.free.shape, field.cell_m
+        self._corner = (field.x0_m, field.y0_m)
+        self._tables: dict[float, tuple[Singles, Singles]] = {}
 
-    def sums(self, rows: tuple[Singles, Singles], sigma_m: float) -> NDArray[np.complex64]:
-        """Sum of weighted scores and of weights where something is known, ``(n,)``, of affine ``rows`` of poses."""
+    def sums(self, to_x: Floats, to_y: Floats, sigma_m: float) -> Singles:
+        """Sum what the points say ``(n,)``, where affine rows ``(n, 3)`` bring them into the field's axes."""
         if sigma_m not in self._tables:
-            scores = self._field.scores(sigma_m).ravel()
-            self._tables[sigma_m] = (scores + 1j * self._field.known().ravel()).astype(np.complex64)
-        x, y = (row @ self._xy1 for row in rows)
-        return np.asarray(self._tables[sigma_m].take(self._field.cells(x, y)) @ self._weight, dtype=np.complex64)
+            rough, plain = (said(kind, sigma_m).take(self._codes) for kind in (ROUGH, PLAIN))
+            self._tables[sigma_m] = (rough, plain)
+        rough, plain = self._tables[sigma_m]
+        rows, cols = self._shape
+        x, y = (self._in_cells(to, axis) @ self._xy1 for axis, to in enumerate((to_x, to_y)))
+        cell = np.clip(y, 0, rows - 1).astype(np.int32) * np.int32(cols) + np.clip(x, 0, cols - 1).astype(np.int32)
+        n = self._rough
+        told = rough.take(cell[:, :n]) @ self._weight[:n] + plain.take(cell[:, n:]) @ self._weight[n:]
+        return np.asarray(told, dtype=np.float32)
+
+    def _in_cells(self, rows: Floats, axis: int) -> Singles:
+        rows[:, 2] -= self._corner[axis]
+        return (rows / self._cell_m).astype(np.float32)
 
 
-def _outward(poses: Floats) -> tuple[Singles, Singles]:
+def said(kind: int, sigma_m: float) -> Singles:
+    """Tell what a rough or plain point says at each code of ``mapping.view.codes_of``, by walls of a given width."""
+    distance_m = np.arange(LEVELS) * LEVEL_M
+    widths_m = (sigma_m, max(BESIDE_M, 1.5 * sigma_m), max(WATER_M, sigma_m))
+    on, beside, dry = (np.exp(-0.5 * (distance_m / width_m) ** 2) for width_m in widths_m)
+    far = distance_m > FAR_M * min(sigma_m / SIGMA_M, 2.0)
+    table = np.zeros(256, dtype=np.float32)
+    for rough in (0, 1):
+        for free in (0, 1):
+            water = free * (IN_WATER[kind] * (1.0 - dry) + FAR_WATER[kind] * far)
+            at = (2 * rough + free) * LEVELS
+            table[at : at + LEVELS] = ON_WALL[kind][1 - rough] * on + BESIDE[kind] * beside + water
+    return table
+
+
+def _outward(poses: Floats) -> tuple[Floats, Floats]:
     """Rows ``(n, 3)`` that bring the scan's points into the reference's axes."""
     c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
-    x, y = np.stack([c, s, poses[:, 0]], axis=1), np.stack([-s, c, poses[:, 1]], axis=1)
-    return x.astype(np.float32), y.astype(np.float32)
+    return np.stack([c, s, poses[:, 0]], axis=1), np.stack([-s, c, poses[:, 1]], axis=1)
 
 
-def _inward(poses: Floats) -> tuple[Singles, Singles]:
+def _inward(poses: Floats) -> tuple[Floats, Floats]:
     """Rows ``(n, 3)`` that bring the reference's points into the scan's axes."""
     c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
     x = np.stack([c, -s, s * poses[:, 1] - c * poses[:, 0]], axis=1)
-    y = np.stack([s, c, -s * poses[:, 0] - c * poses[:, 1]], axis=1)
-    return x.astype(np.float32), y.astype(np.float32)
+    return x, np.stack([s, c, -s * poses[:, 0] - c * poses[:, 1]], axis=1)

@@ -13,6 +13,8 @@ from mapping.values import Pose
 
 ELSEWHERE_M = 0.6
 """Poses nearer than this are the same answer."""
+BENT_SD_M = 0.012
+"""What scans are bent by, and walls do not tell: no pose is surer than this."""
 RIDGE_STEP_M = 0.15
 RIDGE_DIP = 4.0
 """Two modes are one ridge where the log-posterior between them falls no deeper than this below the lower one ..."""
@@ -62,6 +64,7 @@ def local_moments(like: Posterior, best: Floats) -> tuple[Floats, Floats]:
         poses = best + np.stack([dx.ravel(), dy.ravel(), dh.ravel()], axis=1)
         mean, covariance = _moments(poses, like.log_posterior(poses))
         covariance += np.diag([step**2, step**2, math.radians(1.0) ** 2]) / 12.0
+        covariance[:2, :2] += BENT_SD_M**2 * np.eye(2)
         if np.linalg.eigvalsh(covariance[:2, :2])[-1] < (half / 3.0) ** 2:
             break
     return mean, covariance
@@ -94,11 +97,13 @@ def ridge_of(like: Likelihood, best: Floats, other: Floats) -> Ridge | None:
     first, last = _extent(heights >= heights[between].max() - RIDGE_FLOOR, between)
     rows = slice(first, last + 1)
     kept = poses.reshape(len(places), -1, 3)[rows]
+    mean, _ = _moments(kept.reshape(-1, 3), log_p[rows].ravel())
     # Along the ridge the power is low; across it, as it is.
     flat = log_p[rows] - (1.0 - RIDGE_TEMPER) * heights[rows, None]
-    mean, covariance = _moments(kept.reshape(-1, 3), flat.ravel())
+    middle, covariance = _moments(kept.reshape(-1, 3), flat.ravel())
+    covariance += np.outer(middle - mean, middle - mean)
     steps = along[:2] * RIDGE_STEP_M
-    covariance[:2, :2] += (np.outer(steps, steps) + 0.05**2 * np.eye(2)) / 12.0
+    covariance[:2, :2] += (np.outer(steps, steps) + 0.05**2 * np.eye(2)) / 12.0 + BENT_SD_M**2 * np.eye(2)
     nodes = kept[np.arange(len(kept)), log_p[rows].argmax(axis=1)]
     return Ridge(nodes, mean, covariance)
 

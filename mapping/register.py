@@ -24,7 +24,7 @@ from mapping.prior import Prior
 from mapping.values import Pose
 from mapping.view import View, to_map
 
-SIGMAS_M = (0.5, 0.4, 0.3, 0.24, 0.19, 0.15, 0.12, 0.1)
+SIGMAS_M = (0.5, 0.4, 0.3, 0.24, 0.19, 0.15, 0.12, 0.1, 0.08)
 """Widths of a wall, from the first step of the filter to the last."""
 SECOND_LOOK_M = 0.24
 """At this width the prior is asked once more: wide walls may lead to where little is known."""

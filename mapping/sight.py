@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from config.schema import Map
-from mapping import grid as grids
 from mapping.beam import PolarEvidence, polar_evidence
-from mapping.values import Pose, Returns, Scan
-from mapping.view import View, field_of, points_of, wall_points
+from mapping.field import field_of_scan
+from mapping.values import Returns, Scan
+from mapping.view import View, points_of, wall_points
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,9 +27,9 @@ class Sight:
 def sight_of(scan: Scan, returns: Returns, config: Map) -> Sight:
     """Make a scan ready for registration and for the grid."""
     evidence = polar_evidence(scan, returns, math.radians(config.beam_deg), config.cell_m)
-    alone = grids.render([(Pose(0.0, 0.0, 0.0), evidence)], config)
     points = points_of(*wall_points(scan.bearing_rad, returns))
-    return Sight(scan, returns, evidence, View(points, field_of(alone)))
+    field = field_of_scan(scan.bearing_rad, returns, scan.step_rad, config.cell_m)
+    return Sight(scan, returns, evidence, View(points, field))
 
 
 def shifted(sight: Sight, by_m: float, config: Map) -> Sight:

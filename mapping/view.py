@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from dataclasses import field as dataclass_field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt
 
-from mapping.values import FREE, Grid, Pose, Returns
+from mapping.field import Field as Field
+from mapping.field import field_of as field_of
+from mapping.values import Pose, Returns
 
 THIN_M = 0.1
 """One point per square of this side: walls near a station are sampled more densely than others."""
@@ -18,21 +20,16 @@ NORMAL_M = 0.35
 EVEN = 0.8
 """Exponent by which common wall directions are weighted down: two long walls must not drown the end wall."""
 NORMAL_SPREAD_RAD = math.radians(12.0)
-HIT_FREE = 0.05
-"""Odds of a point in water that was seen free, against 1 at a wall ..."""
-HIT_UNKNOWN = 0.3
-"""... and of one where nothing is known: neutral."""
 TRUSTED_SD_M = 0.08
 """Returns with a larger standard deviation count less."""
 VAGUE_SD_M = 0.14
 """Returns from here on tell little of the place ..."""
 VAGUE_TRUST = 0.08
 """... because along a tunnel they make ends that travel with the vehicle."""
-WALL_LOG_ODDS = 0.4
-"""Cells above this are walls to registration: it may use vague ones too."""
-KNOWN_M = 0.3
-PAD_M = 0.6
-"""Unknown border around a field."""
+ROUGH_M = 0.3
+"""So far around points where walls end, meet or are cluttered, places are told apart from those at plain walls."""
+LEVEL_M, LEVELS = 0.025, 48
+"""Steps of distance in a view's codes, and how many."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,39 +43,19 @@ class Points:
 
 
 @dataclass(frozen=True, slots=True)
-class Field:
-    """Scores of points: ``distance_m`` to the next wall and ``free`` per cell, both ``(rows, cols)``."""
-
-    distance_m: NDArray[np.float64]
-    free: NDArray[np.bool_]
-    cell_m: float
-    x0_m: float
-    y0_m: float
-
-    def scores(self, sigma_m: float) -> NDArray[np.float32]:
-        """Log-likelihood ratio per cell against knowing nothing, ``(rows, cols)``, at a width of the walls."""
-        near = np.exp(-0.5 * (self.distance_m / sigma_m) ** 2)
-        odds = near + np.where(self.free, HIT_FREE, HIT_UNKNOWN)
-        return np.log(odds / HIT_UNKNOWN).astype(np.float32)
-
-    def cells(self, x_m: NDArray[np.floating], y_m: NDArray[np.floating]) -> NDArray[np.int32]:
-        """Flat indices of places; beyond the border the border's own, where nothing is known."""
-        rows, cols = self.free.shape
-        col = np.clip((x_m - self.x0_m) / self.cell_m, 0, cols - 1).astype(np.int32)
-        row = np.clip((y_m - self.y0_m) / self.cell_m, 0, rows - 1).astype(np.int32)
-        return np.asarray(row * np.int32(cols) + col, dtype=np.int32)
-
-    def known(self) -> NDArray[np.float32]:
-        """1 where a point would be judged, in free water or at a wall, else 0, ``(rows, cols)``."""
-        return (self.free | (self.distance_m < KNOWN_M)).astype(np.float32)
-
-
-@dataclass(frozen=True, slots=True)
 class View:
-    """Points and field of one scan in its own axes (x right, y ahead), or of the map in the map's."""
+    """Points and field of one scan in its own axes (x right, y ahead), or of the map in the map's.
+
+    ``codes`` ``(cells,)`` uint8 tell the field's places apart for scoring, see ``codes_of``.
+    """
 
     points: Points
     field: Field
+    codes: NDArray[np.uint8] = dataclass_field(init=False)
+
+    def __post_init__(self) -> None:
+        """Work out the codes once, not at every registration."""
+        object.__setattr__(self, "codes", codes_of(self.field, self.points))
 
 
 def wall_points(bearing_rad: NDArray[np.float64], returns: Returns) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -146,10 +123,26 @@ def points_of(xy_m: NDArray[np.float64], trust: NDArray[np.float64]) -> Points:
     return Points(thinned, mean_trust, even_weights(normal, mean_trust), normal)
 
 
-def field_of(grid: Grid) -> Field:
-    """Make the field of a grid, with a border of unknown."""
-    pad = math.ceil(PAD_M / grid.cell_m)
-    state = np.pad(grid.state, pad)
-    wall = np.pad(grid.log_odds, pad) > WALL_LOG_ODDS
-    distance = np.full(state.shape, 1e3) if not wall.any() else np.asarray(distance_transform_edt(~wall)) * grid.cell_m
-    return Field(distance, state == FREE, grid.cell_m, grid.x0_m - pad * grid.cell_m, grid.y0_m - pad * grid.cell_m)
+def codes_of(field: Field, points: Points) -> NDArray[np.uint8]:
+    """Tell places apart for scoring, ``(cells,)``: steps of distance to the next wall, free or not, rough or plain."""
+    level = np.minimum(field.distance_m / LEVEL_M + 0.5, LEVELS - 1).astype(np.uint8)
+    rough = ~np.isfinite(points.normal_rad)
+    nearer = _stamped(field, points.xy_m[rough]) < _stamped(field, points.xy_m[~rough])
+    return (level + np.uint8(LEVELS) * field.free + np.uint8(2 * LEVELS) * nearer).ravel().astype(np.uint8)
+
+
+def _stamped(field: Field, xy_m: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Distance of each cell to the next of some points, infinite beyond ``ROUGH_M``, ``(rows, cols)``."""
+    rows, cols = field.free.shape
+    out = np.full(rows * cols, np.inf, dtype=np.float32)
+    reach = math.ceil(ROUGH_M / field.cell_m)
+    at = np.floor((xy_m - [field.x0_m, field.y0_m]) / field.cell_m).astype(np.int64)
+    inside = (at >= reach).all(axis=1) & (at < np.array([cols, rows]) - reach).all(axis=1)
+    offset = np.arange(-reach, reach + 1)
+    col, row = at[inside, 0][:, None] + offset, at[inside, 1][:, None] + offset
+    dx = (col + 0.5) * field.cell_m + field.x0_m - xy_m[inside, :1]
+    dy = (row + 0.5) * field.cell_m + field.y0_m - xy_m[inside, 1:]
+    apart = np.hypot(dx[:, None, :], dy[:, :, None]).astype(np.float32)
+    np.minimum.at(out, (row[:, :, None] * cols + col[:, None, :]).ravel(), apart.ravel())
+    out[out > ROUGH_M] = np.inf
+    return out.reshape(rows, cols)
