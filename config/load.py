@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import copy
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 from pydantic import ValidationError
+from pydantic_core import ErrorDetails
 
 from config.checks import check
 from config.errors import ConfigError, InputError
@@ -62,9 +64,41 @@ def _validated(file: str, raw: dict[str, Any]) -> tuple[Config | None, list[Mist
     try:
         config = Config.model_validate(raw)
     except ValidationError as error:
-        return None, _from_pydantic(file, raw, error)
-    found = [Mistake(file, each.key, each.got, each.expected, each.hint) for each in check(config)]
+        mistakes = _from_pydantic(file, raw, error)
+        return None, [*mistakes, *_conflicts_of_the_rest(file, raw, error)]
+    found = _conflicts(file, config)
     return (None if found else _with_sound_speed(config)), found
+
+
+def _conflicts(file: str, config: Config) -> list[Mistake]:
+    return [Mistake(file, each.key, each.got, each.expected, each.hint) for each in check(config)]
+
+
+def _conflicts_of_the_rest(file: str, raw: dict[str, Any], error: ValidationError) -> list[Mistake]:
+    """Conflicts between the keys that are right one by one, so that nobody has to mend a file in two rounds."""
+    rest, wrong = copy.deepcopy(raw), [_resolve(raw, each["loc"])[0] for each in _told(error)]
+    for place in sorted(wrong, key=len, reverse=True):
+        _drop(rest, place)
+    # What goes with an unknown driver is unknown, and a default that stands for a wrong key is nobody's mistake.
+    unknown = tuple(f"{_dotted(place[:-1])}." for place in wrong if place and place[-1] == "driver")
+    told = {_dotted(place) for place in wrong}
+    try:
+        config = Config.model_validate(rest)
+    except ValidationError:
+        return []  # what is left has no sense without what is wrong
+    found = _conflicts(file, config)
+    return [each for each in found if each.key not in told and not each.key.startswith(unknown or ("-",))]
+
+
+def _drop(raw: dict[str, Any], place: tuple[int | str, ...]) -> None:
+    """Remove a key, or the key of the list that holds a wrong element."""
+    while place and isinstance(place[-1], int):
+        place = place[:-1]
+    inside: Any = raw
+    for step in place[:-1]:
+        inside = inside[step]
+    if place:
+        inside.pop(place[-1], None)
 
 
 def _with_sound_speed(config: Config) -> Config:
@@ -79,9 +113,7 @@ def _with_sound_speed(config: Config) -> Config:
 def _from_pydantic(file: str, raw: dict[str, Any], error: ValidationError) -> list[Mistake]:
     """One mistake a key: the branches of a union, told apart by pydantic, are one mistake to a person."""
     mistakes: dict[str, Mistake] = {}
-    for each in error.errors(include_url=False):
-        if each["type"] == "default_factory_not_called":
-            continue  # a key that is left out and hangs on one that is wrong
+    for each in _told(error):
         place, value = _resolve(raw, each["loc"])
         key = _dotted(place)
         if each["type"] == "extra_forbidden":
@@ -90,6 +122,11 @@ def _from_pydantic(file: str, raw: dict[str, Any], error: ValidationError) -> li
         else:
             mistakes.setdefault(key, Mistake(file, key, _shown(value), expected(place)))
     return list(mistakes.values())
+
+
+def _told(error: ValidationError) -> list[ErrorDetails]:
+    """Leave out the errors of keys that are left out and hang on one that is wrong."""
+    return [each for each in error.errors(include_url=False) if each["type"] != "default_factory_not_called"]
 
 
 def _resolve(raw: dict[str, Any], loc: tuple[int | str, ...]) -> tuple[tuple[int | str, ...], Any]:

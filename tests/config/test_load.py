@@ -160,3 +160,18 @@ def test_check_config_command(write: Write, capsys: pytest.CaptureFixture[str]) 
     assert body["ok"] is False
     assert body["mistakes"][0]["key"] == "sonar.rang_m"
     assert main(["check-config", str(bad.with_name("absent.toml"))]) == 66
+
+
+def test_conflicts_are_told_beside_wrong_keys(tmp_path: Path) -> None:
+    path = tmp_path / "dive.toml"
+    path.write_text(
+        '[sonar]\nbaud = 12\nsector_deg = [10, 10]\n[publish]\nbind = "tcp://0.0.0.0"\n'
+        '[[feed]]\nname = "a"\ndriver = "nmae"\nunit = "bar"\n[[feed]]\nname = "b"\nprovides = ["heeding", "depth"]\n'
+        'port = "/dev/ttyUSB9"\nunit = "bar"\n'
+    )
+    config, mistakes = read_config(path)
+    assert config is None
+    # Nothing is said of what goes with a driver that is unknown.
+    assert [each.key for each in mistakes] == [
+        "sonar.baud", "feed[0].driver", "feed[1].provides[0]", "feed[1].unit", "sonar.sector_deg", "publish.keys",
+    ]  # fmt: skip
