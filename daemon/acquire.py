@@ -22,6 +22,7 @@ from config.errors import DataError, LacunaError, PortError
 from config.schema import Sonar
 from daemon import snapshots
 from daemon.beams import Beams
+from daemon.fault import fault
 from daemon.job import Job
 from daemon.line import Line
 from daemon.link import ANSWER, READY, Link, take_job
@@ -281,6 +282,9 @@ def main() -> int:
     except LacunaError as error:
         link.fatal(error)
         return error.exit_code
+    except Exception as error:  # noqa: BLE001  (the last place that can tell it in a line)
+        link.fatal(fault("acquisition", error))
+        return LacunaError.exit_code
     finally:
         with contextlib.suppress(KeyboardInterrupt):
             link.close()

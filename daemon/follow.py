@@ -13,6 +13,7 @@ from typing import Final
 
 from config.errors import LacunaError
 from daemon import snapshots
+from daemon.fault import fault
 from daemon.job import Job
 from daemon.link import READY, Link, take_job
 from daemon.pipeline import Pipeline
@@ -125,6 +126,9 @@ def main() -> int:
     except LacunaError as error:
         link.fatal(error)
         return error.exit_code
+    except Exception as error:  # noqa: BLE001  (the last place that can tell it in a line)
+        link.fatal(fault("map", error))
+        return LacunaError.exit_code
     finally:
         link.close()
     return 0
