@@ -34,6 +34,9 @@ WITNESSES = 2
 """... and so many of its scans, each for itself, lie on known walls."""
 ACCEPT_OVERLAP, ACCEPT_FIT = 0.35, 0.35
 
+OVERLAP_POWER, FEW = 0.8, 0.1
+"""How far a score is divided by the share of the scan that falls on what is known; where that is less, no farther."""
+
 Floats = NDArray[np.float64]
 
 
@@ -65,6 +68,19 @@ class _Asked:
     view: View
     reference: View
     like: Likelihood
+    known: NDArray[np.float32]
+
+    def told(self, poses: Floats, sigma_m: float) -> Floats:
+        """Log-likelihood ``(n,)`` of poses ``(n, 3)`` as if nearly all of the scan fell on what is known.
+
+        Several stations know much, and much that is known draws scans to where they find their like.
+        """
+        xy, c, s = self.view.points.xy_m[::2], np.cos(poses[:, 2]), np.sin(poses[:, 2])
+        x = poses[:, :1] + np.outer(c, xy[:, 0]) + np.outer(s, xy[:, 1])
+        y = poses[:, 1:2] - np.outer(s, xy[:, 0]) + np.outer(c, xy[:, 1])
+        known = self.known.take(self.reference.field.cells(x, y)).mean(axis=1)
+        share = ((known + FEW) / (1.0 + FEW)) ** OVERLAP_POWER
+        return np.asarray(self.like.witnesses * self.like.score(poses, sigma_m) / share, dtype=np.float64)
 
 
 class Together:
@@ -76,7 +92,7 @@ class Together:
 
     def log_posterior(self, poses: Floats, sigma_m: float = SIGMA_M) -> Floats:
         """Log-posterior ``(n,)`` of poses ``(n, 3)``, up to a constant."""
-        told = [each.like.witnesses * each.like.score(_carried(poses, each.seen), sigma_m) for each in self._asked]
+        told = [each.told(_carried(poses, each.seen), sigma_m) for each in self._asked]
         return np.asarray(self._power * np.sum(told, axis=0) + self._prior.log_density(poses), dtype=np.float64)
 
 
@@ -105,7 +121,9 @@ def _ask(pieces: Pieces, charts: Charts, base: int, lead: int, k: int, prior: Pr
     there = put_at(Pose(prior.x_m, prior.y_m, prior.heading_rad), seen)
     about = replace(prior, x_m=there.x_m, y_m=there.y_m)
     reference = charts.reference(charts.about(base, (there.x_m, there.y_m), sight), about, sight)
-    return _Asked(seen, sight.view, reference, Likelihood(sight.view, reference, about))
+    return _Asked(
+        seen, sight.view, reference, Likelihood(sight.view, reference, about), reference.field.known().ravel()
+    )
 
 
 def _is_witness(each: _Asked, pose: Floats) -> bool:
