@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daemon.snapshots import Snapshot, degrees, number
+from daemon.swing import compass_facts
 from drivers.records import Json
 from fill.guide import Goal
 from fill.values import Filled, Hole, Mesh
@@ -20,9 +21,13 @@ Stamp = tuple[int, int]
 
 
 def stations(stamp: Stamp, all_stations: Sequence[Station]) -> Snapshot:
-    """Every station, for later ones move earlier ones; ``newest`` is the index of the scan that came last."""
+    """Every station, for later ones move earlier ones; ``newest`` is the index of the scan that came last.
+
+    ``compass`` is what the stations say of the compass (``daemon.swing``).
+    """
     newest: Json = all_stations[-1].scan.index if all_stations else None
     fields: dict[str, Json] = {"newest": newest, "stations": [_station(each) for each in all_stations]}
+    fields["compass"] = compass_facts(all_stations)
     return Snapshot("station", *stamp, fields)
 
 

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.schema import Map
+from mapping.compass import wrap
 from mapping.grid import Canvas, gather
 from mapping.likelihood import Likelihood, Posterior
-from mapping.modes import ELSEWHERE_M
+from mapping.modes import ELSEWHERE_M, ELSEWHERE_RAD
 from mapping.pieces import LEVEL_M, Pieces, sd_m
 from mapping.prior import Cloud, Prior
 from mapping.register import Match, register, search
@@ -48,17 +49,17 @@ class Charts:
         held = self.about(base, (prior.x_m, prior.y_m), sight)
         reference = self.reference(held, prior, sight)
         if rise_m(sight.scan, self._pieces.sight(held[0]).scan) <= LEVEL_M:
-            match = register(sight.view, reference, prior, self._config.particles, rng)
+            match = register(sight.view, reference, prior, self._config.particles * prior.effort, rng)
             if held == [base]:
                 return match
             alone = Likelihood(sight.view, self.reference([base], prior, sight), prior)
-            best, _ = search(alone, prior, self._config.particles, rng, np.zeros((0, 3)))
+            best, _ = search(alone, prior, self._config.particles * prior.effort, rng, np.zeros((0, 3)))
             margin = doubted(match, best, Likelihood(sight.view, reference, prior), alone)
             return replace(match, margin=min(match.margin, margin))
         rise = min(rise_m(sight.scan, self._pieces.sight(k).scan) for k in held)
         tapers = np.arange(-TAPER_STEPS, TAPER_STEPS + 1) * (TAPER * rise / TAPER_STEPS)
         views = [shifted(sight, float(taper), self._config).view for taper in tapers]
-        particles = max(LEAST_PARTICLES, self._config.particles // 3)
+        particles = max(LEAST_PARTICLES, self._config.particles // 3) * prior.effort
         return best_of([register(view, reference, prior, particles, rng) for view in views])
 
     def walk(self, base: int, ways: Sequence[Way], rng: np.random.Generator) -> Cloud | None:
@@ -118,7 +119,7 @@ def doubted(found: Found, best: Floats, whole: Posterior, alone: Posterior) -> f
     show for itself.  The scan before knows least, and so is drawn least to where much is known.
     """
     pose = np.array([found.pose.x_m, found.pose.y_m, found.pose.heading_rad])
-    if math.hypot(*(best - pose)[:2]) < ELSEWHERE_M:
+    if math.hypot(*(best - pose)[:2]) < ELSEWHERE_M and abs(wrap(float(best[2] - pose[2]))) < ELSEWHERE_RAD:
         return math.inf
     against = max(0.0, _height(alone, best) - _height(alone, pose))
     return found.height - _height(whole, best) - against

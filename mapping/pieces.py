@@ -19,6 +19,8 @@ from mapping.refine import Wall, bond, wall_of
 from mapping.sight import Sight, rise_m
 from mapping.values import Pose
 
+NO_COMPASS_SD_RAD = 1e3
+"""A compass that is not there says nothing."""
 LEVEL_M = 0.5
 """Scans whose depths differ by more see other walls: wells taper."""
 NEIGHBOURS = 8
@@ -117,9 +119,10 @@ class Pieces:
         """Adjust a piece: what is known first, then with the walls that its stations are found to share."""
         stations = sorted(members)
         heading = {k: self._sights[k].scan.heading_rad for k in stations}
+        sd_rad = self._compass_sd_rad if all(self._sights[k].scan.has_compass for k in stations) else NO_COMPASS_SD_RAD
         for _ in range(ROUNDS):
             poses = {k: self._poses[k] for k in stations}
-            solution = solve(poses, self._ties(stations), Compass(heading, self._compass_sd_rad))
+            solution = solve(poses, self._ties(stations), Compass(heading, sd_rad))
             self._poses.update(zip(solution.stations, solution.poses, strict=True))
             if not self._compare(solution):
                 break

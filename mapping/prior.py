@@ -12,6 +12,9 @@ EDGE_M = 0.3
 """Softness of the edge of the disc."""
 CLOUD_SHARE = 0.998
 """How far a cloud is trusted against the disc."""
+DISTURBED_SD_RAD = math.radians(40.0)
+LOG_DISTURBED = math.log(0.005)
+"""How far iron nearby turns a compass, and how seldom, as a share of the density of one that is right."""
 HINT_SD_M = 0.3
 """Least uncertainty of a pilot's hint."""
 DISAGREE = 9.0
@@ -38,7 +41,8 @@ class Cloud:
 class Prior:
     """Where the scan may have been made: a disc of ``reach_m`` about a place, or a normal with ``sd_m``.
 
-    With a ``cloud``, there; or, with what trust is left, anywhere in the disc.
+    With a ``cloud``, there; or, with what trust is left, anywhere in the disc.  Without a compass ``heading_sd_rad`` is
+    infinite; where the compass may be ``disturbed``, iron nearby may turn it by much more than that.
     """
 
     x_m: float
@@ -48,6 +52,7 @@ class Prior:
     heading_sd_rad: float
     gaussian: bool = False
     cloud: Cloud | None = None
+    disturbed: bool = False
 
     @property
     def is_led(self) -> bool:
@@ -65,7 +70,17 @@ class Prior:
         if self.cloud is not None:
             mean = np.array([self.cloud.x_m, self.cloud.y_m])
             xy[::2] = mean + rng.normal(0.0, 1.0, (len(xy[::2]), 2)) @ np.linalg.cholesky(self.cloud.covariance).T
-        return np.column_stack([xy, self.heading_rad + rng.normal(0.0, self.heading_sd_rad, n)])
+        return np.column_stack([xy, self.heading_rad + self._turns(n, rng)])
+
+    def _turns(self, n: int, rng: np.random.Generator) -> Floats:
+        if math.isinf(self.heading_sd_rad):
+            return rng.uniform(-math.pi, math.pi, n)
+        return rng.normal(0.0, DISTURBED_SD_RAD if self.disturbed else self.heading_sd_rad, n)
+
+    @property
+    def effort(self) -> int:
+        """How many times more particles it takes than with a compass that is believed."""
+        return 8 if math.isinf(self.heading_sd_rad) else 4 if self.disturbed else 1
 
     def astray(self, pose: Floats) -> float:
         """Tell how many standard deviations a pose ``(3,)`` is from the cloud, or from where odometry led; else 0."""
@@ -86,7 +101,10 @@ class Prior:
             near -= math.log(2.0 * math.pi) + 0.5 * math.log(np.linalg.det(self.cloud.covariance))
             place = np.logaddexp(math.log(1.0 - CLOUD_SHARE) + place, math.log(CLOUD_SHARE * area) + near)
         turn = (poses[:, 2] - self.heading_rad + math.pi) % (2.0 * math.pi) - math.pi
-        return np.asarray(place - 0.5 * (turn / self.heading_sd_rad) ** 2, dtype=np.float64)
+        told = -0.5 * (turn / self.heading_sd_rad) ** 2
+        if self.disturbed:
+            told = np.logaddexp(told, LOG_DISTURBED - 0.5 * (turn / DISTURBED_SD_RAD) ** 2)
+        return np.asarray(place + told, dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True)

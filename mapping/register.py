@@ -19,7 +19,7 @@ from mapping.likelihood import POINTS_A_WITNESS as POINTS_A_WITNESS
 from mapping.likelihood import SIGMA_M, Likelihood, Posterior
 from mapping.likelihood import WITNESSES as WITNESSES
 from mapping.modes import ELSEWHERE_M as ELSEWHERE_M
-from mapping.modes import Mode, local_moments, pose_of, ridge_of
+from mapping.modes import ELSEWHERE_RAD, Mode, local_moments, pose_of, ridge_of
 from mapping.prior import Prior
 from mapping.values import Pose
 from mapping.view import View, to_map
@@ -76,7 +76,8 @@ def register(scan: View, reference: View, prior: Prior, particles: int, rng: np.
     other, other_height = search(like, prior, particles, rng, best[None, :])
     if other_height > height:
         best, height, other, other_height = other, other_height, best, height
-    ridge = ridge_of(like, best, other) if height - other_height < RIDGE_MARGIN else None
+    rival = height - other_height < RIDGE_MARGIN and math.hypot(*(best - other)[:2]) >= ELSEWHERE_M
+    ridge = ridge_of(like, best, other) if rival else None
     if ridge is None:
         mean, covariance = local_moments(like, best)
     else:
@@ -107,7 +108,7 @@ def _modes(like: Likelihood, first: tuple[Pose, Floats], other: Floats, margin: 
 def search(
     like: Posterior, prior: Prior, particles: int, rng: np.random.Generator, barred: Floats
 ) -> tuple[Floats, float]:
-    """Anneal particles from the prior to the best pose ``(3,)``, not within ``ELSEWHERE_M`` of barred ones."""
+    """Anneal particles from the prior to the best pose ``(3,)``, not near barred ones, in place and in heading."""
     poses = prior.draw(particles, rng)
     for sigma in SIGMAS_M:
         if sigma == SECOND_LOOK_M:
@@ -127,8 +128,9 @@ def search(
 
 def _bar(log_p: Floats, poses: Floats, barred: Floats) -> Floats:
     near = np.zeros(len(poses), dtype=bool)
-    for x_m, y_m, _ in barred:
-        near |= np.hypot(poses[:, 0] - x_m, poses[:, 1] - y_m) < ELSEWHERE_M
+    for x_m, y_m, heading_rad in barred:
+        turned = np.abs((poses[:, 2] - heading_rad + math.pi) % (2.0 * math.pi) - math.pi)
+        near |= (np.hypot(poses[:, 0] - x_m, poses[:, 1] - y_m) < ELSEWHERE_M) & (turned < ELSEWHERE_RAD)
     return np.where(near, -1e6, log_p)
 
 

@@ -282,6 +282,7 @@ class ScanBuilder:
             step_rad=step_of(beams),
             quality=quality,
             way=self._passage.way_to(start_ns),
+            has_compass=len(self._headings) > 0,
             moved=self._odometer.since_last((start_ns + end_ns) // 2),
         )
         self._passage.begin([b for b in self._beams if b.ping.t_ns > end_ns])

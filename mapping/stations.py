@@ -15,7 +15,6 @@ import numpy as np
 
 from config.schema import Map
 from mapping.chart import Charts
-from mapping.compass import wrap
 from mapping.graph import put_at, seen_from
 from mapping.grid import Canvas
 from mapping.hypotheses import ASKED, lies
@@ -24,6 +23,7 @@ from mapping.levels import levels_of
 from mapping.pieces import Pieces
 from mapping.prior import Hint, Prior, agreed
 from mapping.sight import Sight
+from mapping.swing import is_turned, swung
 from mapping.values import Grid, Pose, Station, Way
 from mapping.verdict import judge, nowhere, origin
 
@@ -31,6 +31,8 @@ FEW_POINTS = 12
 """Scans with fewer wall points cannot be placed, and no map can begin with them."""
 BACK = 3
 """So many scans back a vehicle is still within reach, and its way is followed."""
+BAD_FIT = 0.7
+"""A scan that fits worse is tried as if its compass were disturbed."""
 TRIES = 2
 """Pieces tried again for one new scan: it must not take longer as the dive goes on."""
 
@@ -123,14 +125,17 @@ class Stations:
         seeds = [self._config.seed, sight.scan.index, base]
         prior = self._prior(i, base, np.random.default_rng([*seeds, 1]))
         match = along(self._charts.match(sight, base, prior, np.random.default_rng(seeds)), prior)
+        if is_turned(match.pose.heading_rad, prior) or match.fit < BAD_FIT:
+            anyhow = replace(prior, cloud=None, disturbed=True)
+            other = self._charts.match(sight, base, anyhow, np.random.default_rng([*seeds, 2]))
+            match, prior = (other, anyhow) if other.height > match.height else (match, prior)
         piece = 0 if base in self._map else self._sights[base].scan.index + 1
         return judge(sight.scan, match, piece, prior, chained=abs(base - i) == 1)
 
     def _prior(self, i: int, base: int, rng: np.random.Generator) -> Prior:
         """Say where a scan may have been made: within reach of another, or in a cloud."""
         at, steps = self._pieces.pose(base), abs(base - i)
-        heading = self._sights[i].scan.heading_rad + self._turned(base)
-        sd = math.radians(self._config.compass_sd_deg)
+        heading, sd = self._heading(i, base)
         hint = self._hint(base, i)
         if hint is not None:
             prior = hint.prior(at.x_m, at.y_m, heading, sd)
@@ -141,12 +146,18 @@ class Stations:
         ways = self._ways(base, i)
         return agreed(prior, self._charts.walk(base, ways, rng) if ways else None)
 
-    def _turned(self, k: int) -> float:
-        """How far the axes of a piece are turned against what the compass said in it."""
-        piece = self._pieces.of(k)
-        off = [self._pieces.pose(j).heading_rad - self._sights[j].scan.heading_rad for j in piece]
-        near = [wrap(each - off[0]) for each in off]
-        return off[0] + float(np.median(near))
+    def _heading(self, i: int, base: int) -> tuple[float, float]:
+        """Say what the compass tells of a scan's heading in the axes of a piece, and how surely."""
+        scan, piece = self._sights[i].scan, self._pieces.of(base)
+        if not (scan.has_compass and self._sights[base].scan.has_compass):
+            return self._pieces.pose(base).heading_rad, math.inf
+        read = [self._sights[j].scan.heading_rad for j in piece]
+        sd = math.radians(self._config.compass_sd_deg)
+        swing = swung(read, [self._pieces.pose(j).heading_rad for j in piece], sd)
+        add = swing.at(scan.heading_rad)[0]
+        if swing.is_disturbed[piece.index(base)]:  # the iron may still be near
+            add = self._pieces.pose(base).heading_rad - self._sights[base].scan.heading_rad
+        return scan.heading_rad + add, sd
 
     def _hint(self, base: int, i: int) -> Hint | None:
         """Join what the pilot said of the whole way from one scan to another, turned round where that came later."""
@@ -167,6 +178,8 @@ class Stations:
 
     def _ways(self, base: int, i: int) -> list[Way]:
         """Ways from a station to another, turned round where it came later; none where one was not seen."""
+        if not all(self._sights[k].scan.has_compass for k in (base, i)):
+            return []
         between = [self._sights[k].scan.way for k in range(min(base, i) + 1, max(base, i) + 1)]
         seen = [way for way in between if way is not None]
         if len(seen) < len(between) or len(seen) > BACK:
@@ -190,6 +203,10 @@ class Stations:
             prior = self._prior(lead, base, np.random.default_rng([*seeds, 1]))
             rng = np.random.default_rng(seeds)
             fit = lies(self._pieces, self._charts, (base, lead), prior, self._config.particles // 2, rng)
+            if is_turned(fit.pose.heading_rad, prior):
+                anyhow = replace(prior, cloud=None, disturbed=True)
+                other = lies(self._pieces, self._charts, (base, lead), anyhow, self._config.particles, rng)
+                fit = other if other.height > fit.height else fit
             if fit.is_sure:
                 self._pieces.close(base, lead, fit.pose, fit.covariance)
 

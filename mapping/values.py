@@ -63,7 +63,7 @@ class Scan:
     order in which they came.  ``quality`` is ``full`` for a whole circle at rest, ``partial`` for less than a circle,
     ``moving`` where the scan's own beams disagree.  ``depth_m`` is nan where no depth was told.  ``way`` holds the
     pings since the scan before, None where the way was not seen whole; ``moved`` is how far odometry led since then,
-    None without it.
+    None without it.  Without a compass ``heading_rad`` says nothing.
     """
 
     index: int
@@ -78,6 +78,7 @@ class Scan:
     quality: Literal["full", "partial", "moving"]
     way: Way | None = None
     moved: Displacement | None = None
+    has_compass: bool = True
 
 
 @dataclass(frozen=True, slots=True)

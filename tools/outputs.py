@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daemon.state import MapState, grid_digest, mesh_digest, poses_digest
+from daemon.swing import compass_facts
 from drivers.records import Json
 from fill.values import Filled
 from mapping.values import FREE, OCCUPIED
@@ -76,6 +77,7 @@ def report(state: MapState, origin: Provenance) -> dict[str, Json]:
         "versions": _versions(origin),
         "stations": dict(Counter[str](station.status for station in state.stations)),
         "pieces": len({station.piece for station in state.stations if station.status == "placed"}),
+        "compass": compass_facts(state.stations),
         "grid": _grid_facts(state),
         "fills": _fill_facts(state.filled),
         "mesh": {"vertices": len(state.mesh.vertices), "triangles": len(state.mesh.triangles)},
