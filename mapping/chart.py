@@ -16,12 +16,11 @@ from mapping.grid import Canvas, gather
 from mapping.likelihood import Likelihood, Posterior
 from mapping.modes import ELSEWHERE_M, ELSEWHERE_RAD
 from mapping.pieces import LEVEL_M, Pieces, sd_m
-from mapping.prior import Cloud, Prior
+from mapping.prior import Prior
 from mapping.register import Match, register, search
 from mapping.sight import Sight, rise_m, shifted
-from mapping.values import Pose, Way
+from mapping.values import Pose
 from mapping.view import Field, Points, View, field_of, points_of, to_map
-from mapping.way import Walk
 
 NEIGHBOURS = 6
 """Stations, those nearest, that make a reference: with all, a scan would take longer as the dive goes on."""
@@ -62,13 +61,6 @@ class Charts:
         particles = max(LEAST_PARTICLES, self._config.particles // 3) * prior.effort
         return best_of([register(view, reference, prior, particles, rng) for view in views])
 
-    def walk(self, base: int, ways: Sequence[Way], rng: np.random.Generator) -> Cloud | None:
-        """Carry a cloud from a station along ways; None where one of them was not seen whole."""
-        pose, sight = self._pieces.pose(base), self._pieces.sight(base)
-        field = self._field(self.about(base, (pose.x_m, pose.y_m), sight))
-        walk = Walk(pose, sight.scan.heading_rad, field, rng)
-        return walk.cloud if all(walk.follow(way, self._config) for way in ways) else None
-
     def about(self, base: int, xy_m: tuple[float, float], sight: Sight) -> list[int]:
         """Stations nearest to a place, of a scan's level if there are any, that lie to ``base`` surely."""
         solution = self._pieces.solution(base)
@@ -97,7 +89,7 @@ def _fewer(points: Points) -> Points:
     n = len(points.xy_m)
     kept = np.linspace(0.0, n - 1.0, min(n, POINTS)).astype(np.intp)
     weight = points.weight[kept] * (n / max(len(kept), 1)) / max(float(points.weight[kept].sum()), 1e-9)
-    return Points(points.xy_m[kept], points.trust[kept], weight, points.normal_rad[kept])
+    return Points(points.xy_m[kept], points.trust[kept] * (n / max(len(kept), 1)), weight, points.normal_rad[kept])
 
 
 class Found(Protocol):

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.schema import Map
+from mapping import grid as grids
 from mapping.path import HERE, KNOT_S, THERE, WITNESS, Floats, Marks, bonds_of
 from mapping.sight import Sight
 from mapping.values import Pose, Way
-from mapping.view import HIT_FREE, HIT_UNKNOWN, from_map, to_map
+from mapping.view import Field, field_of, from_map, to_map
 from mapping.way import ranges_of
 
 MOST_KNOTS = 64
@@ -21,6 +22,8 @@ CLEAR = 0.3
 FINE_M = 0.03
 """Width of walls where marks are bound along them."""
 BOUND_M = 0.15
+HIT_FREE, HIT_UNKNOWN = 0.05, 0.3
+"""Odds of a mark in water that was seen free, and where nothing is known, against 1 at a wall."""
 LEAST_KNOWN = 0.4
 """Share of the marks, by trust, below which it counts against a path that little of them is known elsewhere."""
 HULL_M = 0.12
@@ -31,10 +34,13 @@ THROUGH = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Course:
-    """A way cut into ``knots``, ``seconds`` long, with the marks of both rests and of the way between them."""
+    """A way cut into ``knots``, ``seconds`` long, with the marks of both rests and of the way between them.
 
-    here: Sight
-    there: Sight
+    ``here`` and ``there`` are the fields of the two rests, in axes of the compass.
+    """
+
+    here: Field
+    there: Field
     marks: Marks
     seconds: float
     knots: int
@@ -65,7 +71,11 @@ def course_of(here: Sight, there: Sight, way: Way, config: Map) -> Course:
         np.concatenate([*(p.share for p in parts), at - state]),
         np.concatenate([*(p.group for p in parts), (turned / math.pi).astype(np.intp) + 1]),
     )
-    return Course(here, there, marks, seconds, knots)
+    return Course(_field(here, config), _field(there, config), marks, seconds, knots)
+
+
+def _field(sight: Sight, config: Map) -> Field:
+    return field_of(grids.render([(Pose(0.0, 0.0, sight.scan.heading_rad), sight.evidence)], config))
 
 
 def _at_rest(sight: Sight, state: int, group: int) -> Marks:
@@ -89,13 +99,13 @@ def agreement(path: Floats, course: Course) -> float:
     bonds = bonds_of(marks, places, BOUND_M)
     near = np.exp(-0.5 * (bonds.off_m / FINE_M) ** 2)
     total = known = every = 0.0
-    for sight, group, at in ((course.here, HERE, path[0]), (course.there, THERE, path[-1])):
+    for field, group, at in ((course.here, HERE, path[0]), (course.there, THERE, path[-1])):
         best, bound = np.zeros(len(places)), np.zeros(len(places), dtype=bool)
         for side, other in ((bonds.one, bonds.other), (bonds.other, bonds.one)):
             here = (marks.group[other] == group) & (marks.group[side] != group)
             np.maximum.at(best, side[here], near[here])
             bound[side[here]] = True
-        odds = best + np.where(bound, 0.5 * HIT_UNKNOWN, np.where(_free(sight, at, places), HIT_FREE, HIT_UNKNOWN))
+        odds = best + np.where(bound, 0.5 * HIT_UNKNOWN, np.where(_free(field, at, places), HIT_FREE, HIT_UNKNOWN))
         told = bound | (odds == HIT_FREE)
         trust = marks.trust * (marks.group != group)
         total += float((trust * told) @ np.log(odds / HIT_UNKNOWN))
@@ -106,9 +116,9 @@ def agreement(path: Floats, course: Course) -> float:
     )
 
 
-def _free(sight: Sight, at: Floats, places: Floats) -> NDArray[np.bool_]:
-    xy = from_map(Pose(float(at[0]), float(at[1]), float(at[2]) + sight.scan.heading_rad), places)
-    return sight.view.field.free.ravel().take(sight.view.field.cells(xy[:, 0], xy[:, 1]))
+def _free(field: Field, at: Floats, places: Floats) -> NDArray[np.bool_]:
+    xy = from_map(Pose(float(at[0]), float(at[1]), float(at[2])), places)
+    return field.free.ravel().take(field.cells(xy[:, 0], xy[:, 1]))
 
 
 def _gone_through(path: Floats, marks: Marks, places: Floats) -> float:

@@ -1,4 +1,4 @@
-"""Where odometry led: what it tells of a place that walls alone do not."""
+"""Where odometry, or the way as it was seen, led: what that tells of a place that walls alone do not."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mapping.values import Displacement, Pose
 
 LED_SD_M = 0.1
 """Least uncertainty of odometry from one scan to the next."""
-LED_MARGIN, LED_OVERLAP, LED_FIT = 3.0, 0.2, 0.45
+LED_MARGIN, LED_OVERLAP, LED_FIT = 3.0, 0.2, 0.2
 """Walls must only not speak against a place that is known without them."""
 SLIDES = 0.12
 """Information along the weakest axis (0.5 is the most) below which walls are not asked where along it a scan was made:
@@ -37,14 +37,15 @@ def led(moved: Sequence[Displacement | None], turn_rad: float, *, back: bool, re
 
 
 def along(match: Match, prior: Prior) -> Match:
-    """Put a scan that walls leave free to slide where odometry led, along the way in which it could slide."""
-    if not prior.is_led or match.hold >= SLIDES:
+    """Put a scan that walls leave free to slide where odometry or the way led, along the line on which it slides."""
+    place = prior.led_to
+    if place is None or match.hold >= SLIDES:
         return match
     axis = np.array([math.sin(match.weak_rad), math.cos(match.weak_rad)])
-    short_m = float((np.array([prior.x_m, prior.y_m]) - [match.pose.x_m, match.pose.y_m]) @ axis)
+    short_m = float((np.array([place.x_m, place.y_m]) - [match.pose.x_m, match.pose.y_m]) @ axis)
     x_m, y_m = np.array([match.pose.x_m, match.pose.y_m]) + short_m * axis
     across = np.eye(3)
     across[:2, :2] -= np.outer(axis, axis)
     covariance = across @ match.covariance @ across
-    covariance[:2, :2] += prior.reach_m**2 * np.outer(axis, axis)
+    covariance[:2, :2] += float(axis @ place.covariance @ axis) * np.outer(axis, axis)
     return replace(match, pose=Pose(float(x_m), float(y_m), match.pose.heading_rad), covariance=covariance)

@@ -55,9 +55,17 @@ class Prior:
     disturbed: bool = False
 
     @property
+    def led_to(self) -> Cloud | None:
+        """Where odometry or the way led, where that is surer than any pilot."""
+        if self.cloud is not None:
+            return self.cloud if self.cloud.sd_m <= HINT_SD_M else None
+        led = self.gaussian and self.reach_m < HINT_SD_M
+        return Cloud(self.x_m, self.y_m, self.reach_m**2 * np.eye(2)) if led else None
+
+    @property
     def is_led(self) -> bool:
-        """Whether odometry led here: it is surer than any pilot."""
-        return self.gaussian and self.reach_m < HINT_SD_M
+        """Whether odometry or the way led here."""
+        return self.led_to is not None
 
     def draw(self, n: int, rng: np.random.Generator) -> Floats:
         """Draw ``(n, 3)`` poses; with a cloud half of them from it."""

@@ -23,14 +23,15 @@ from mapping.levels import levels_of
 from mapping.pieces import Pieces
 from mapping.prior import Hint, Prior, agreed
 from mapping.sight import Sight
+from mapping.strides import Strides
 from mapping.swing import is_turned, swung
-from mapping.values import Grid, Pose, Station, Way
+from mapping.values import Grid, Pose, Station
 from mapping.verdict import judge, nowhere, origin
 
 FEW_POINTS = 12
 """Scans with fewer wall points cannot be placed, and no map can begin with them."""
 BACK = 3
-"""So many scans back a vehicle is still within reach, and its way is followed."""
+"""So many scans back a vehicle is still within reach."""
 BAD_FIT = 0.7
 """A scan that fits worse is tried as if its compass were disturbed."""
 TRIES = 2
@@ -45,6 +46,7 @@ class Stations:
         self._canvas = Canvas(config)
         self._pieces = Pieces(math.radians(config.compass_sd_deg))
         self._charts = Charts(self._pieces, self._canvas, config)
+        self._strides = Strides(config)
         self._judged: list[Station] = []
         self._sights: list[Sight] = []
         self._hints: list[Hint | None] = []
@@ -123,7 +125,7 @@ class Stations:
         """Find the place of a scan in the piece of another."""
         sight = self._sights[i]
         seeds = [self._config.seed, sight.scan.index, base]
-        prior = self._prior(i, base, np.random.default_rng([*seeds, 1]))
+        prior = self._prior(i, base)
         match = along(self._charts.match(sight, base, prior, np.random.default_rng(seeds)), prior)
         if is_turned(match.pose.heading_rad, prior) or match.fit < BAD_FIT:
             anyhow = replace(prior, cloud=None, disturbed=True)
@@ -132,7 +134,7 @@ class Stations:
         piece = 0 if base in self._map else self._sights[base].scan.index + 1
         return judge(sight.scan, match, piece, prior, chained=abs(base - i) == 1)
 
-    def _prior(self, i: int, base: int, rng: np.random.Generator) -> Prior:
+    def _prior(self, i: int, base: int) -> Prior:
         """Say where a scan may have been made: within reach of another, or in a cloud."""
         at, steps = self._pieces.pose(base), abs(base - i)
         heading, sd = self._heading(i, base)
@@ -143,8 +145,8 @@ class Stations:
             prior = way.prior(at.x_m, at.y_m, heading, sd)
         else:
             prior = Prior(at.x_m, at.y_m, self._config.reach_m * min(steps, BACK), heading, sd)
-        ways = self._ways(base, i)
-        return agreed(prior, self._charts.walk(base, ways, rng) if ways else None)
+        compass = all(self._sights[k].scan.has_compass for k in (base, i))
+        return agreed(prior, self._strides.cloud(self._sights, base, i, at) if compass else None)
 
     def _heading(self, i: int, base: int) -> tuple[float, float]:
         """Say what the compass tells of a scan's heading in the axes of a piece, and how surely."""
@@ -176,16 +178,6 @@ class Stations:
         turn_rad = self._pieces.pose(base).heading_rad - self._sights[base].scan.heading_rad
         return led(between, turn_rad, back=base > i, reach_m=self._config.reach_m)
 
-    def _ways(self, base: int, i: int) -> list[Way]:
-        """Ways from a station to another, turned round where it came later; none where one was not seen."""
-        if not all(self._sights[k].scan.has_compass for k in (base, i)):
-            return []
-        between = [self._sights[k].scan.way for k in range(min(base, i) + 1, max(base, i) + 1)]
-        seen = [way for way in between if way is not None]
-        if len(seen) < len(between) or len(seen) > BACK:
-            return []
-        return seen if base < i else [way.back() for way in reversed(seen)]
-
     def _join(self) -> None:
         """Join pieces that follow each other in time, where their scans together say how they lie."""
         for _ in range(TRIES):
@@ -200,7 +192,7 @@ class Stations:
                     self._pieces.close(base, lead, tied.pose, tied.covariance)
                 continue
             seeds = [self._config.seed, *pair, *self._sizes(pair)]
-            prior = self._prior(lead, base, np.random.default_rng([*seeds, 1]))
+            prior = self._prior(lead, base)
             rng = np.random.default_rng(seeds)
             fit = lies(self._pieces, self._charts, (base, lead), prior, self._config.particles // 2, rng)
             if is_turned(fit.pose.heading_rad, prior):

@@ -17,7 +17,7 @@ from config.schema import Map
 from mapping.course import HULL_M, LEAST_KNOWN, THROUGH, Course, agreement, course_of
 from mapping.path import HERE, THERE, WITNESS, Floats, improve, inertia
 from mapping.prior import Cloud
-from mapping.sight import Sight
+from mapping.sight import Sight, rise_m
 from mapping.values import Way
 
 STEP_M = 0.15
@@ -32,9 +32,17 @@ APART_M = 0.4
 MOST = 12
 """Displacements that are settled."""
 SETTLE_M = (0.3, 0.15, 0.15)
+"""How far marks may lie from the walls they are bound to, from first to last ..."""
+ROUNDS = 2
+"""... for so many rounds each."""
 TEMPER = 0.2
 """Power of the likelihood between settled paths: each errs in its own way."""
-WIDEN = 2.0
+FALSE_SD_M = 0.07
+"""So sure a smooth passage seems to be of what it does not tell: normals of walls are not known to better than two
+degrees, and what hundreds of them say along it is an error ..."""
+SMOOTH_SD_M = 1.5
+"""... where less than this may be known."""
+WIDEN = 1.5
 """A settled path is too sure of itself: the standard deviation is multiplied by this ..."""
 LEAST_SD_M = 0.02
 """... and is no less than this."""
@@ -42,23 +50,34 @@ BEYOND = 1.2
 """Displacements are tried up to so many times the pilot's reach."""
 GAP_S = 5.0
 """After a pause of this the way was not seen."""
+RISE_M = 0.3
 LONGEST_S = 120.0
 """Of longer ways too few knots would be told."""
 
 
 @dataclass(frozen=True, slots=True)
 class Settled:
-    """A path that is at rest in least squares: where it ends ``(2,)``, ``covariance`` ``(2, 2)``, and its height."""
+    """A ``path`` ``(states, 3)`` that least squares have settled, ``covariance`` ``(2, 2)`` of its end, its height."""
 
-    end_m: Floats
+    path: Floats
     covariance: Floats
     height: float
 
+    @property
+    def end_m(self) -> Floats:
+        """Displacement ``(2,)``."""
+        return self.path[-1, :2]
+
 
 def traverse(here: Sight, there: Sight, way: Way, config: Map) -> Cloud | None:
-    """Tell the displacement from one rest to the other, east and north by the compass; None where a part is missing."""
+    """Tell the displacement from one rest to the other, east and north by the compass.
+
+    None where a part of the way was not seen, or where the vehicle went up or down: wells taper.
+    """
     pauses_s = np.diff(way.t_ns) * 1e-9
     if len(pauses_s) == 0 or pauses_s.max() > GAP_S or pauses_s.sum() > LONGEST_S:
+        return None
+    if rise_m(here.scan, there.scan) > RISE_M:
         return None
     course = course_of(here, there, way, config)
     prior = inertia(course.seconds, course.knots)
@@ -77,12 +96,19 @@ def traverse(here: Sight, there: Sight, way: Way, config: Map) -> Cloud | None:
 def settle(path: Floats, course: Course, prior: Floats) -> Settled:
     """Settle a path by least squares, and tell how well it fits."""
     information = prior
-    for within_m in SETTLE_M:
-        path, information = improve(path, course.marks.along(path), prior, within_m, 2)
+    for reach_m in SETTLE_M:
+        path, information = improve(path, course.marks.along(path), prior, reach_m, ROUNDS)
     moves = path.ravel()
     height = agreement(path, course) - 0.5 * float(moves @ prior @ moves)
     covariance = np.asarray(np.linalg.inv(information[3:, 3:])[-3:-1, -3:-1], dtype=np.float64)
-    return Settled(path[-1, :2], covariance, height)
+    return Settled(path, sobered(covariance), height)
+
+
+def sobered(covariance: Floats) -> Floats:
+    """Take from what is known of a displacement ``(2, 2)``, in every direction, what walls only seem to tell."""
+    variance, axes = np.linalg.eigh(covariance)
+    information = np.maximum(1.0 / variance - FALSE_SD_M**-2, SMOOTH_SD_M**-2)
+    return np.asarray(axes @ np.diag(1.0 / information) @ axes.T, dtype=np.float64)
 
 
 def sketch(course: Course, reach_m: float) -> list[Floats]:
@@ -125,14 +151,12 @@ def _heights(course: Course, ends: Floats, lag: float) -> Floats:
     marks, gone = course.marks, _gone(course.when(), lag)
     total, known = np.zeros(len(ends)), np.zeros(len(ends))
     every = 0.0
-    for sight, group in ((course.here, HERE), (course.there, THERE)):
+    for field, group in ((course.here, HERE), (course.there, THERE)):
         kept = np.flatnonzero(marks.group != group)[::THIN]
         trust, arm = THIN * marks.trust[kept], marks.arm_m[kept]
         share = gone[kept] - (0.0 if group == HERE else 1.0)
-        c, s = math.cos(sight.scan.heading_rad), math.sin(sight.scan.heading_rad)
-        x, y = (ends[:, k : k + 1] * share + arm[:, k] for k in (0, 1))
-        cells = sight.view.field.cells(c * x - s * y, s * x + c * y)
-        scores, told = sight.view.field.scores(SKETCH_M).ravel(), sight.view.field.known().ravel().take(cells)
+        cells = field.cells(*(ends[:, k : k + 1] * share + arm[:, k] for k in (0, 1)))
+        scores, told = field.scores(SKETCH_M).ravel(), field.known().ravel().take(cells)
         total += (scores.take(cells) * told) @ trust
         known += told @ trust
         every += float(trust.sum())

@@ -40,10 +40,6 @@ class Way:
     bin_m: float
     step_rad: float
 
-    def back(self) -> Way:
-        """Give the same way, gone backwards."""
-        return Way(-self.t_ns[::-1], self.direction_rad[::-1], self.echoes[::-1], self.bin_m, self.step_rad)
-
 
 @dataclass(frozen=True, slots=True)
 class Displacement:

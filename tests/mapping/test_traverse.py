@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -68,6 +69,13 @@ def test_a_way_with_a_pause_was_not_seen(keyhole: tuple[Sight, Sight]) -> None:
     assert way is not None
     late = way.t_ns + np.where(np.arange(len(way.t_ns)) > 100, 20_000_000_000, 0)
     assert traverse(*keyhole, Way(late, way.direction_rad, way.echoes, way.bin_m, way.step_rad), Map()) is None
+
+
+def test_a_way_to_another_depth_is_not_followed(keyhole: tuple[Sight, Sight]) -> None:
+    here, there = keyhole
+    assert there.scan.way is not None
+    deeper = replace(there, scan=replace(there.scan, depth_m=2.0))
+    assert traverse(here, deeper, there.scan.way, Map()) is None
 
 
 def test_a_way_of_which_nothing_was_heard_leaves_the_rests_to_speak(keyhole: tuple[Sight, Sight]) -> None:

@@ -9,41 +9,29 @@ import pytest
 from config.schema import Map
 from mapping.echoes import pick
 from mapping.prior import Cloud, Hint, Prior, agreed
-from mapping.sight import sight_of
+from mapping.sight import Sight, sight_of
+from mapping.strides import Strides
 from mapping.values import Pose, Scan
-from mapping.way import Walk
-from tests.mapping.rooms import KEYHOLE, TUNNEL, Stay, pings
+from mapping.way import ranges_of
+from tests.mapping.rooms import KEYHOLE, Stay, cast, pings
 from tests.mapping.test_scan_builder import build
 
-
-def two_scans(walls: np.ndarray, there: Stay) -> tuple[Scan, Scan]:
-    stays = [Stay(0.3, -0.2, 0.4, 330), there]
-    first, second = build(list(pings(walls, stays, np.random.default_rng(3))))
-    return first, second
-
-
-def followed(first: Scan, second: Scan) -> Cloud:
-    assert second.way is not None
-    sight = sight_of(first, pick(first, Map()), Map())
-    start = Pose(0.0, 0.0, 0.0)  # of the first scan's own axes: its field is not turned
-    walk = Walk(start, first.heading_rad, sight.view.field, np.random.default_rng(1))
-    assert walk.follow(second.way, Map())
-    return walk.cloud
+STAYS = [Stay(0.3, -0.2, 0.4, 330), Stay(0.1, 1.6, 1.2, 330, glide=250), Stay(0.0, -0.9, 0.6, 330, glide=250)]
+START_PINGS = 330
 
 
 @pytest.fixture(scope="module")
-def keyhole() -> tuple[Scan, Scan]:
-    return two_scans(KEYHOLE, Stay(0.1, 1.6, 1.2, 330, glide=250))
+def keyhole() -> list[Scan]:
+    return build(list(pings(KEYHOLE, STAYS, np.random.default_rng(3))))
 
 
-def moved(there: Stay) -> np.ndarray:
-    """The way in axes that turn with the first scan."""
-    dx, dy, h = there.x_m - 0.3, there.y_m + 0.2, 0.4
-    return np.array([math.cos(h) * dx - math.sin(h) * dy, math.sin(h) * dx + math.cos(h) * dy])
+@pytest.fixture(scope="module")
+def sights(keyhole: list[Scan]) -> list[Sight]:
+    return [sight_of(scan, pick(scan, Map()), Map()) for scan in keyhole]
 
 
-def test_scans_hold_the_pings_of_the_way_between_them(keyhole: tuple[Scan, Scan]) -> None:
-    first, second = keyhole
+def test_scans_hold_the_pings_of_the_way_between_them(keyhole: list[Scan]) -> None:
+    first, second, _ = keyhole
     assert first.way is None
     way = second.way
     assert way is not None
@@ -51,49 +39,77 @@ def test_scans_hold_the_pings_of_the_way_between_them(keyhole: tuple[Scan, Scan]
     assert way.t_ns[-1] < second.t_start_ns
     assert np.all(np.diff(way.t_ns) > 0)
     assert len(way.t_ns) == len(way.echoes) == len(way.direction_rad) > 250
-    back = way.back()
-    assert np.all(np.diff(back.t_ns) > 0)
-    np.testing.assert_array_equal(back.echoes[0], way.echoes[-1])
 
 
-def test_a_cloud_follows_the_vehicle_through_a_room(keyhole: tuple[Scan, Scan]) -> None:
-    cloud = followed(*keyhole)
-    off = np.array([cloud.x_m, cloud.y_m]) - moved(Stay(0.1, 1.6, 1.2, 0))
-    assert np.hypot(*off) < 0.6
-    assert off @ np.linalg.solve(cloud.covariance, off) < 9.0
-
-
-def test_the_same_way_gives_the_same_cloud(keyhole: tuple[Scan, Scan]) -> None:
-    one, two = followed(*keyhole), followed(*keyhole)
-    assert (one.x_m, one.y_m) == (two.x_m, two.y_m)
-
-
-def test_along_a_smooth_tunnel_a_cloud_knows_that_it_does_not_know() -> None:
-    first, _ = two_scans(KEYHOLE, Stay(0.1, 1.6, 1.2, 330, glide=250))
-    tunnel = list(pings(TUNNEL, [Stay(0.0, 0.0, 0.0, 330)], np.random.default_rng(3)))
-    (here,) = build(tunnel)
-    assert here.way is None
-    assert first.way is None
-    way = two_scans(KEYHOLE, Stay(0.1, 1.6, 1.2, 330, glide=250))[1].way
+def test_beams_under_way_see_the_walls_where_they_are(keyhole: list[Scan]) -> None:
+    way = keyhole[1].way
     assert way is not None
-    along = replace(
-        way, echoes=np.resize(here.echoes, way.echoes.shape), direction_rad=np.resize(here.bearing_rad, len(way.t_ns))
+    range_m, trust = ranges_of(way, Map())
+    gone = np.clip((way.t_ns / 50_000_000 - START_PINGS + 1) / 250, 0.0, 1.0)
+    here, there = STAYS[:2]
+    true_m = np.array(
+        [
+            cast(KEYHOLE, here.x_m + g * (there.x_m - here.x_m), here.y_m + g * (there.y_m - here.y_m), d)[0]
+            for g, d in zip(gone, way.direction_rad, strict=True)
+        ]
     )
-    sight = sight_of(here, pick(here, Map()), Map())
-    walk = Walk(Pose(0.0, 0.0, 0.0), 0.0, sight.view.field, np.random.default_rng(1))
-    assert walk.follow(along, Map())
-    value, vector = np.linalg.eigh(walk.cloud.covariance)
-    assert math.sqrt(value[1]) > 1.0
-    assert abs(vector[0, 1]) > 0.9
+    heard = np.isfinite(range_m)
+    assert heard.mean() > 0.6
+    assert np.array_equal(heard, trust > 0.0)
+    off_m = np.abs(range_m - true_m)[heard]
+    assert np.median(off_m) < 0.03
+    assert np.mean(off_m > 0.3) < 0.05
 
 
-def test_a_way_with_a_pause_was_not_seen(keyhole: tuple[Scan, Scan]) -> None:
-    first, second = keyhole
-    assert second.way is not None
-    late = second.way.t_ns + np.where(np.arange(len(second.way.t_ns)) > 100, 20_000_000_000, 0)
-    sight = sight_of(first, pick(first, Map()), Map())
-    walk = Walk(Pose(0.0, 0.0, 0.0), 0.0, sight.view.field, np.random.default_rng(1))
-    assert not walk.follow(replace(second.way, t_ns=late), Map())
+def test_a_head_that_turns_to_and_fro_is_picked_leg_by_leg(keyhole: list[Scan]) -> None:
+    way = keyhole[1].way
+    assert way is not None
+    there = np.arange(60)
+    order = np.concatenate([there, there[::-1], there])
+    swept = replace(way, t_ns=np.arange(180) * 50_000_000, direction_rad=way.direction_rad[order])
+    swept = replace(swept, echoes=way.echoes[order])
+    range_m, _ = ranges_of(swept, Map())
+    forth, back, again = range_m[:60], range_m[60:120][::-1], range_m[120:]
+    both = np.isfinite(forth) & np.isfinite(back) & np.isfinite(again)
+    assert both.mean() > 0.5
+    np.testing.assert_allclose(forth[both], again[both], atol=0.05)
+    np.testing.assert_allclose(forth[both], back[both], atol=0.05)
+
+
+def test_ways_lead_there_and_back_and_turn_with_the_map(sights: list[Sight]) -> None:
+    strides = Strides(Map())
+    start = Pose(5.0, 7.0, 0.4)
+    there = strides.cloud(sights, 0, 1, start)
+    assert there is not None
+    assert (there.x_m, there.y_m) == pytest.approx((4.8, 8.8), abs=0.06)
+    back = strides.cloud(sights, 1, 0, Pose(4.8, 8.8, 1.2))
+    assert back is not None
+    assert (back.x_m, back.y_m) == pytest.approx((5.0, 7.0), abs=0.08)
+    turned = strides.cloud(sights, 0, 1, Pose(5.0, 7.0, 0.4 + math.pi / 2.0))
+    assert turned is not None
+    assert (turned.x_m, turned.y_m) == pytest.approx((6.8, 7.2), abs=0.06)
+    assert turned.covariance[0, 0] == pytest.approx(there.covariance[1, 1], rel=0.05)
+
+
+def test_ways_are_joined_as_long_as_all_were_seen(sights: list[Sight]) -> None:
+    strides = Strides(Map())
+    far = strides.cloud(sights, 0, 2, Pose(0.3, -0.2, 0.4))
+    assert far is not None
+    assert (far.x_m, far.y_m) == pytest.approx((0.0, -0.9), abs=0.1)
+    one = strides.cloud(sights, 0, 1, Pose(0.3, -0.2, 0.4))
+    assert one is not None
+    assert far.sd_m > one.sd_m
+    unseen = [sights[0], replace(sights[1], scan=replace(sights[1].scan, way=None)), sights[2]]
+    assert Strides(Map()).cloud(unseen, 0, 2, Pose(0.3, -0.2, 0.4)) is None
+
+
+def test_a_prior_is_led_by_a_way_that_is_surer_than_a_pilot() -> None:
+    prior = Prior(0.0, 0.0, 3.0, 0.0, 0.07)
+    assert not prior.is_led
+    sure, unsure = Cloud(1.0, 0.0, 0.01 * np.eye(2)), Cloud(1.0, 0.0, np.diag([0.01, 1.0]))
+    assert replace(prior, cloud=sure).led_to == sure
+    assert not replace(prior, cloud=unsure).is_led
+    assert replace(prior, cloud=sure).astray(np.array([1.3, 0.0, 0.0])) == pytest.approx(3.0)
 
 
 def test_pilot_and_cloud_agree_or_the_pilot_is_believed() -> None:
