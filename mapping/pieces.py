@@ -31,7 +31,7 @@ SURE_M = 0.15
 """Where two stations lie to each other less surely, their walls may be taken for others."""
 STALE_M, STALE_RAD = 0.05, math.radians(1.0)
 """A bond is made anew where its stations moved against each other by so much."""
-TRUST = 0.35
+TRUST = 0.6
 """What the information of common walls is worth: their errors are not independent from pair to pair."""
 DOUBT_M, DOUBT_RAD = 0.2, math.radians(3.0)
 """Where registration is less sure than this, common walls are no surer than it; where it is surer, they are more so."""
@@ -51,8 +51,8 @@ class _Bond:
 class Pieces:
     """Which scans hold together, and where each is in its piece."""
 
-    def __init__(self, compass_sd_rad: float) -> None:
-        self._compass_sd_rad = compass_sd_rad
+    def __init__(self, compass_sd_rad: float, beam_rad: float) -> None:
+        self._compass_sd_rad, self._beam_rad = compass_sd_rad, beam_rad
         self._sights: dict[int, Sight] = {}
         self._walls: dict[int, Wall] = {}
         self._poses: dict[int, Pose] = {}
@@ -84,12 +84,12 @@ class Pieces:
 
     def begin(self, i: int, sight: Sight, pose: Pose) -> None:
         """Begin a piece with a station."""
-        self._sights[i], self._walls[i], self._poses[i] = sight, wall_of(sight.view.points), pose
+        self._sights[i], self._walls[i], self._poses[i] = sight, wall_of(sight.view.points, self._beam_rad), pose
         self._settle((i,))
 
     def grow(self, i: int, sight: Sight, base: int, pose: Pose, covariance: Floats) -> None:
         """Add a station to the piece of ``base``, where registration found it with a ``covariance`` ``(3, 3)``."""
-        self._sights[i], self._walls[i], self._poses[i] = sight, wall_of(sight.view.points), pose
+        self._sights[i], self._walls[i], self._poses[i] = sight, wall_of(sight.view.points, self._beam_rad), pose
         self._doubts[i] = covariance
         self._found.append(tie_of(base, self._poses[base], i, pose, covariance))
         self._settle((*self.of(base), i))

@@ -50,12 +50,17 @@ class Wall:
     tree: cKDTree
 
 
-def wall_of(points: Points) -> Wall:
-    """Make a station's points ready: normals as angles of axes that turn counter-clockwise, towards the station."""
+def wall_of(points: Points, beam_rad: float) -> Wall:
+    """Make a station's points ready: normals as angles of axes that turn counter-clockwise, towards the station.
+
+    A beam of some width smears a wall that it meets aslant, and hears its nearer edge first: such points count less.
+    """
     known = np.isfinite(points.normal_rad)
     xy, normal = points.xy_m[known], points.normal_rad[known]
-    away = xy[:, 0] * np.cos(normal) + xy[:, 1] * np.sin(normal) > 0.0
-    return Wall(xy, np.where(away, normal - math.pi, normal), points.trust[known], cKDTree(xy))
+    across = xy[:, 0] * np.cos(normal) + xy[:, 1] * np.sin(normal)
+    along = xy[:, 1] * np.cos(normal) - xy[:, 0] * np.sin(normal)
+    smeared = 1.0 / (1.0 + (0.5 * beam_rad * along / SIGMA_M) ** 2)
+    return Wall(xy, np.where(across > 0.0, normal - math.pi, normal), points.trust[known] * smeared, cKDTree(xy))
 
 
 def bond(one: tuple[int, Wall], other: tuple[int, Wall], start: Pose) -> Tie | None:

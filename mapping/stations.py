@@ -44,7 +44,7 @@ class Stations:
     def __init__(self, config: Map) -> None:
         self._config = config
         self._canvas = Canvas(config)
-        self._pieces = Pieces(math.radians(config.compass_sd_deg))
+        self._pieces = Pieces(math.radians(config.compass_sd_deg), math.radians(config.beam_deg))
         self._charts = Charts(self._pieces, self._canvas, config)
         self._strides = Strides(config)
         self._judged: list[Station] = []

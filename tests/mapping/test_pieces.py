@@ -19,6 +19,7 @@ from tests.mapping.rooms import KEYHOLE, RECTANGLE, Stay, pings
 from tests.mapping.test_scan_builder import build
 
 STAYS = [Stay(0.3, -0.5, 0.4, 330), Stay(0.1, 0.9, 1.2, 330), Stay(0.2, 2.6, 2.0, 330), Stay(0.6, 4.7, 5.9, 330)]
+BEAM = math.radians(3.0)
 DOUBT = np.diag([0.05**2, 0.05**2, math.radians(1.0) ** 2])
 
 
@@ -42,7 +43,7 @@ def keyhole() -> list[Sight]:
 
 def grown(sights: list[Sight], off_m: float = 0.06) -> Pieces:
     """A piece of the keyhole, each station found a little off."""
-    pieces = Pieces(math.radians(4.0))
+    pieces = Pieces(math.radians(4.0), BEAM)
     pieces.begin(0, sights[0], true(STAYS[0]))
     for k in (1, 2, 3):
         seen = seen_from(true(STAYS[k - 1]), true(STAYS[k]))
@@ -59,7 +60,7 @@ def turned(heading_rad: float, seen: Pose) -> np.ndarray:
 
 
 def test_common_walls_tell_how_two_stations_lie(keyhole: list[Sight]) -> None:
-    walls = [wall_of(sight.view.points) for sight in keyhole]
+    walls = [wall_of(sight.view.points, BEAM) for sight in keyhole]
     seen = seen_from(true(STAYS[0]), true(STAYS[1]))
     tie = bond((0, walls[0]), (1, walls[1]), replace(seen, x_m=seen.x_m + 0.12, heading_rad=seen.heading_rad + 0.03))
     assert tie is not None
@@ -73,8 +74,8 @@ def test_the_two_faces_of_a_thin_wall_are_not_one() -> None:
     here = points_of(np.stack([x, np.full_like(x, 1.0)], axis=1), np.ones_like(x))
     there = points_of(np.stack([x, np.full_like(x, -1.0)], axis=1), np.ones_like(x))
     start = Pose(0.0, 2.1, 0.0)  # it stands behind the wall, whose other face it sees
-    assert bond((0, wall_of(here)), (1, wall_of(there)), start) is None
-    facing = bond((0, wall_of(here)), (1, wall_of(here)), Pose(0.0, 0.1, 0.0))
+    assert bond((0, wall_of(here, BEAM)), (1, wall_of(there, BEAM)), start) is None
+    facing = bond((0, wall_of(here, BEAM)), (1, wall_of(here, BEAM)), Pose(0.0, 0.1, 0.0))
     assert facing is not None
     assert facing.pose.y_m == pytest.approx(0.0, abs=0.01)
 
@@ -82,7 +83,9 @@ def test_the_two_faces_of_a_thin_wall_are_not_one() -> None:
 def test_a_straight_wall_tells_nothing_along_it() -> None:
     x, rng = np.arange(-4.0, 4.0, 0.04), np.random.default_rng(1)
     sides = np.concatenate([np.stack([x, np.full_like(x, y)], axis=1) for y in (-0.8, 0.8)])
-    one, other = (wall_of(points_of(sides + rng.normal(0.0, 0.03, sides.shape), np.ones(len(sides)))) for _ in "ab")
+    one, other = (
+        wall_of(points_of(sides + rng.normal(0.0, 0.03, sides.shape), np.ones(len(sides))), BEAM) for _ in "ab"
+    )
     tie = bond((0, one), (1, other), Pose(0.2, 0.05, 0.0))
     assert tie is not None
     assert tie.information[1, 1] > 1000.0
@@ -107,7 +110,7 @@ def test_a_piece_settles_where_its_walls_agree(keyhole: list[Sight]) -> None:
 
 
 def test_pieces_that_are_tied_become_one_and_keep_how_they_lie(keyhole: list[Sight]) -> None:
-    pieces = Pieces(math.radians(4.0))
+    pieces = Pieces(math.radians(4.0), BEAM)
     pieces.begin(0, keyhole[0], true(STAYS[0]))
     pieces.begin(2, keyhole[2], Pose(50.0, 50.0, 1.0))
     at = Pose(50.0, 50.0, 1.0)
@@ -123,7 +126,7 @@ def test_pieces_that_are_tied_become_one_and_keep_how_they_lie(keyhole: list[Sig
 
 
 def test_what_only_a_dropped_station_held_falls_apart(keyhole: list[Sight]) -> None:
-    pieces = Pieces(math.radians(4.0))
+    pieces = Pieces(math.radians(4.0), BEAM)
     pieces.begin(0, keyhole[0], true(STAYS[0]))
     foreign = sights_of(RECTANGLE, [Stay(3.0, 0.0, 1.0, 330)])[0]
     pieces.grow(1, foreign, 0, Pose(20.0, 0.0, 1.0), DOUBT)

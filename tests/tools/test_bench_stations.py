@@ -6,6 +6,7 @@ import pytest
 
 from config.errors import UsageError
 from tools.bench.stations import pairs, read
+from tools.bench.whole_logs import whole
 
 
 def test_pairs_of_a_real_log_are_near_and_none_is_confidently_wrong(shared_data: Path) -> None:
@@ -19,3 +20,11 @@ def test_pairs_of_a_real_log_are_near_and_none_is_confidently_wrong(shared_data:
 def test_a_log_that_is_not_there_is_told(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="--data"):
         read(tmp_path / "none.npz")
+
+
+@pytest.mark.slow
+def test_a_real_log_holds_together_in_pieces_that_are_true(shared_data: Path) -> None:
+    figures = whole(read(shared_data / "stations" / "freiburg-079.npz"), "freiburg-079", hinted=False)
+    assert figures.in_pieces > 0.75
+    assert figures.rmse_m < 0.15
+    assert figures.wrong == 0

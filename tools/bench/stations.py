@@ -17,19 +17,18 @@ from numpy.typing import NDArray
 
 from config.errors import UsageError
 from config.schema import Map
-from mapping.prior import Hint, Prior
+from mapping.prior import Prior
 from mapping.register import register
 from mapping.sight import Sight, sight_of
-from mapping.stations import Stations
 from mapping.values import Returns, Scan
 from mapping.verdict import judge
-from tools.bench.align import align, angle_between
+from tools.bench.align import angle_between
+from tools.bench.whole_logs import LogFigures, whole
 
 LOGS: Final = ("intel", "freiburg-079", "fhw")
 REACH_M: Final = 3.0
 NEAR_M, NEAR_DEG, WRONG_M = 0.15, 3.0, 0.5
 IN_95: Final = 5.99
-HINT_M: Final = 0.5
 
 Floats = NDArray[np.float64]
 
@@ -44,21 +43,6 @@ class PairFigures:
     near_to_2_m: float
     accepted: float
     accepted_wrong: int
-    covered: float
-
-
-@dataclass(frozen=True, slots=True)
-class LogFigures:
-    """A whole log, scan after scan; errors after the best rigid alignment of the placed stations."""
-
-    log: str
-    hints: str
-    stations: int
-    placed: int
-    pieces: int
-    wrong: int
-    error_median_m: float
-    error_95_m: float
     covered: float
 
 
@@ -131,36 +115,6 @@ def _in_axes(log: Laser, i: int) -> Floats:
     return np.array([np.cos(h) * dx - np.sin(h) * dy, np.sin(h) * dx + np.cos(h) * dy])
 
 
-def whole(folder: Path, name: str, *, hinted: bool) -> LogFigures:
-    """Place all scans of a log; with hints that are wrong by up to ``HINT_M`` east and north at each step."""
-    log, stations = read(folder / f"{name}.npz"), Stations(Map())
-    rng = np.random.default_rng(1)
-    for i, sight in enumerate(log.sights):
-        hint = None
-        if hinted and i:
-            dx, dy = log.true_m[i] - log.true_m[i - 1] + rng.uniform(-HINT_M, HINT_M, 2)
-            hint = Hint(float(dx), float(dy), HINT_M)
-        stations.add(sight, hint)
-    placed = [k for k, station in enumerate(stations.all) if station.status == "placed"]
-    found_m = np.array([[stations.all[k].pose.x_m, stations.all[k].pose.y_m] for k in placed])
-    turns = [angle_between(stations.all[k].pose.heading_rad, float(log.heading_rad[k])) for k in placed]
-    fit = align(found_m, log.true_m[placed], float(np.median(turns)))
-    off_m = fit.apply(found_m) - log.true_m[placed]
-    error_m = np.hypot(off_m[:, 0], off_m[:, 1])
-    inside = [_covered(stations.all[k].covariance, off) for k, off in zip(placed[1:], off_m[1:], strict=True)]
-    return LogFigures(
-        log=name,
-        hints="+-0.5 m" if hinted else "none",
-        stations=len(log.sights),
-        placed=len(placed),
-        pieces=len({station.piece for station in stations.all}),
-        wrong=int((error_m > WRONG_M).sum()),
-        error_median_m=round(float(np.median(error_m)), 3),
-        error_95_m=round(float(np.percentile(error_m, 95)), 3),
-        covered=round(float(np.mean(inside)), 3) if inside else 0.0,
-    )
-
-
 def _covered(covariance: Floats, off_m: Floats) -> bool:
     return bool(off_m @ np.linalg.solve(covariance[:2, :2], off_m) <= IN_95)
 
@@ -171,4 +125,4 @@ def measure(folder: Path) -> Iterator[PairFigures | LogFigures]:
         yield pairs(folder / "stations", name)
     for name in LOGS:
         for hinted in (False, True):
-            yield whole(folder / "stations", name, hinted=hinted)
+            yield whole(read(folder / "stations" / f"{name}.npz"), name, hinted=hinted)
