@@ -18,7 +18,8 @@ from mapping.modes import ELSEWHERE_M, ELSEWHERE_RAD
 from mapping.pieces import LEVEL_M, Pieces, sd_m
 from mapping.prior import Prior
 from mapping.register import Match, register, search
-from mapping.sight import Sight, rise_m, shifted
+from mapping.sight import Sight, rise_m
+from mapping.taper import best_scaled
 from mapping.values import Pose
 from mapping.view import Field, Points, View, field_of, points_of, to_map
 
@@ -28,10 +29,8 @@ POINTS = 250
 """Points of a reference: more would take longer, and tell no more."""
 SURE_M = 0.3
 """Stations that lie to the one next in time less surely make no reference with it: their walls would be double."""
-TAPER = 0.5
-"""Largest widening of the walls per metre of depth ..."""
-TAPER_STEPS = 4
-"""... tried in so many steps to either side."""
+SAME_LEVEL_M = 0.2
+"""Where none is of a scan's level, those are that are within this of the nearest level."""
 LEAST_PARTICLES = 200
 
 Floats = NDArray[np.float64]
@@ -56,16 +55,19 @@ class Charts:
             margin = doubted(match, best, Likelihood(sight.view, reference, prior), alone)
             return replace(match, margin=min(match.margin, margin))
         rise = min(rise_m(sight.scan, self._pieces.sight(k).scan) for k in held)
-        tapers = np.arange(-TAPER_STEPS, TAPER_STEPS + 1) * (TAPER * rise / TAPER_STEPS)
-        views = [shifted(sight, float(taper), self._config).view for taper in tapers]
         particles = max(LEAST_PARTICLES, self._config.particles // 3) * prior.effort
-        return best_of([register(view, reference, prior, particles, rng) for view in views])
+
+        def fit(view: View) -> Match:
+            return register(view, reference, prior, particles, rng)
+
+        return best_of(best_scaled(sight, reference, rise, self._config, fit))
 
     def about(self, base: int, xy_m: tuple[float, float], sight: Sight) -> list[int]:
         """Stations nearest to a place, of a scan's level if there are any, that lie to ``base`` surely."""
         solution = self._pieces.solution(base)
-        level = [k for k in solution.stations if rise_m(sight.scan, self._pieces.sight(k).scan) <= LEVEL_M]
-        near = sorted(level or solution.stations, key=lambda k: (_away_m(self._pieces.pose(k), xy_m), k))
+        rise = {k: rise_m(sight.scan, self._pieces.sight(k).scan) for k in solution.stations}
+        level = [k for k in solution.stations if rise[k] <= max(LEVEL_M, min(rise.values()) + SAME_LEVEL_M)]
+        near = sorted(level, key=lambda k: (_away_m(self._pieces.pose(k), xy_m), k))
         sure = [k for k in near if k == base or sd_m(solution.between(base, k)) <= SURE_M]
         return (sure or near)[:NEIGHBOURS]
 

@@ -39,6 +39,8 @@ SHIFT: Final = 0.035
 SHIFT_LATE: Final = 0.03
 """The centre of a leaning wall's echo is nearer than an upright one's by up to ``SHIFT`` of the range, more the later
 its power lies, in shares of the range too: measured on two emulators of different makers."""
+SLANT_POWER: Final = 3.0
+"""At a slant a wall sends little from where it is met squarely: the shift falls with the squared cosine so often."""
 SLANTEST: Final = 1.2
 """Tangent of incidence beyond which an echo is too long by its slant to tell its lean."""
 _DECADE: Final = 10.0 * COUNTS_A_DB
@@ -89,7 +91,7 @@ def late_m(echoes: Floats, floor: Floats, bin_m: float, line: Line, half_beam_ra
 def nearer_m(line: Line, late: Floats) -> Floats:
     """By how much nearer the centres of echoes are for the lean of their walls, ``(n,)``; less at a slant."""
     range_m = np.maximum(line.range_m, 0.1)
-    slant = 1.0 + (np.nan_to_num(line.slope) / range_m) ** 2
+    slant = (1.0 + (np.nan_to_num(line.slope) / range_m) ** 2) ** SLANT_POWER
     return np.asarray(SHIFT * range_m * (1.0 - np.exp(-late / (SHIFT_LATE * range_m))) / slant)
 
 

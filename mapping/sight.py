@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
 from config.schema import Map
 from mapping.beam import PolarEvidence, polar_evidence
 from mapping.field import field_of_scan
@@ -30,13 +28,6 @@ def sight_of(scan: Scan, returns: Returns, config: Map) -> Sight:
     points = points_of(*wall_points(scan.bearing_rad, returns))
     field = field_of_scan(scan.bearing_rad, returns, scan.step_rad, config.cell_m)
     return Sight(scan, returns, evidence, View(points, field))
-
-
-def shifted(sight: Sight, by_m: float, config: Map) -> Sight:
-    """Move all walls away from the vehicle, as a taper between two depths does about a well's axis."""
-    r = sight.returns
-    moved = Returns(np.maximum(r.range_m + by_m, 0.05), r.sd_m, np.maximum(r.free_m + by_m, 0.0))
-    return sight_of(sight.scan, moved, config)
 
 
 def rise_m(a: Scan, b: Scan) -> float:
