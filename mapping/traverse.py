@@ -37,11 +37,13 @@ ROUNDS = 2
 """... for so many rounds each."""
 TEMPER = 0.2
 """Power of the likelihood between settled paths: each errs in its own way."""
-FALSE_SD_M = 0.07
-"""So sure a smooth passage seems to be of what it does not tell: normals of walls are not known to better than two
-degrees, and what hundreds of them say along it is an error ..."""
+FALSE = 0.06
+"""Along a smooth passage walls seem to tell this share of what they tell across it: their normals are not known to
+better, and hundreds of them err to no purpose.  It is taken off ..."""
 SMOOTH_SD_M = 1.5
-"""... where less than this may be known."""
+"""... where no less than this may be unknown ..."""
+ALONE, ELSEWHERE_M = 45.0, 0.4
+"""... unless no path that ends so far from the best one comes within this log-likelihood of it."""
 WIDEN = 1.5
 """A settled path is too sure of itself: the standard deviation is multiplied by this ..."""
 LEAST_SD_M = 0.02
@@ -88,7 +90,8 @@ def traverse(here: Sight, there: Sight, way: Way, config: Map) -> Cloud | None:
     ends = np.array([each.end_m for each in settled])
     mean = weight @ ends
     off = ends - mean
-    own = np.tensordot(weight, np.array([each.covariance for each in settled]), axes=1)
+    told = [each.covariance if is_alone(ends, height) else sobered(each.covariance) for each in settled]
+    own = np.tensordot(weight, np.array(told), axes=1)
     covariance = (weight[:, None] * off).T @ off + WIDEN**2 * own + LEAST_SD_M**2 * np.eye(2)
     return Cloud(float(mean[0]), float(mean[1]), covariance)
 
@@ -101,14 +104,22 @@ def settle(path: Floats, course: Course, prior: Floats) -> Settled:
     moves = path.ravel()
     height = agreement(path, course) - 0.5 * float(moves @ prior @ moves)
     covariance = np.asarray(np.linalg.inv(information[3:, 3:])[-3:-1, -3:-1], dtype=np.float64)
-    return Settled(path, sobered(covariance), height)
+    return Settled(path, covariance, height)
 
 
 def sobered(covariance: Floats) -> Floats:
-    """Take from what is known of a displacement ``(2, 2)``, in every direction, what walls only seem to tell."""
+    """Take from what is known of a displacement ``(2, 2)`` what walls only seem to tell."""
     variance, axes = np.linalg.eigh(covariance)
-    information = np.maximum(1.0 / variance - FALSE_SD_M**-2, SMOOTH_SD_M**-2)
-    return np.asarray(axes @ np.diag(1.0 / information) @ axes.T, dtype=np.float64)
+    along, across = 1.0 / variance[1], 1.0 / variance[0]
+    information = [across, max(along - FALSE * across, SMOOTH_SD_M**-2)]
+    return np.asarray(axes @ np.diag(1.0 / np.array(information)) @ axes.T, dtype=np.float64)
+
+
+def is_alone(ends: Floats, height: Floats) -> bool:
+    """Tell whether all paths that fit end at one place."""
+    best = int(np.argmax(height))
+    elsewhere = np.hypot(*(ends - ends[best]).T) > ELSEWHERE_M
+    return bool(height[best] - height[elsewhere].max(initial=-math.inf) >= ALONE)
 
 
 def sketch(course: Course, reach_m: float) -> list[Floats]:

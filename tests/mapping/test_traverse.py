@@ -12,7 +12,7 @@ from mapping.echoes import pick
 from mapping.path import HERE, THERE, improve, inertia
 from mapping.prior import Cloud
 from mapping.sight import Sight, sight_of
-from mapping.traverse import traverse
+from mapping.traverse import is_alone, sobered, traverse
 from mapping.values import Way
 from tests.mapping.rooms import KEYHOLE, TUNNEL, Stay, pings
 from tests.mapping.test_scan_builder import build
@@ -106,3 +106,17 @@ def test_a_path_that_is_a_little_wrong_settles_where_the_vehicle_went(keyhole: t
     assert agreement(settled, course) > agreement(path, course) + 5.0
     assert np.linalg.eigvalsh(information[3:, 3:]).min() > 0.0
     assert np.all(settled[0] == 0.0)
+
+
+def test_what_smooth_walls_seem_to_tell_along_them_is_taken_off() -> None:
+    turn = np.array([[0.8, -0.6], [0.6, 0.8]])
+    smooth, corner = (turn @ np.diag([along**2, 0.01**2]) @ turn.T for along in (0.08, 0.02))
+    assert np.sqrt(np.linalg.eigvalsh(sobered(smooth))) == pytest.approx([0.01, 1.5])
+    assert np.sqrt(np.linalg.eigvalsh(sobered(corner))) == pytest.approx([0.01, 0.02], rel=0.2)
+
+
+def test_paths_that_end_near_the_best_one_are_no_rivals() -> None:
+    ends = np.array([[0.0, 0.0], [0.1, 0.2], [1.0, 0.0]])
+    assert is_alone(ends, np.array([100.0, 99.0, 40.0]))
+    assert not is_alone(ends, np.array([100.0, 99.0, 80.0]))
+    assert is_alone(ends[:1], np.array([3.0]))
