@@ -5,6 +5,8 @@ Pure: no clock and no input but the records, so the same log gives the same map,
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from config.schema import Config
@@ -61,6 +63,11 @@ class Pipeline:
         """The map as it is."""
         filled, mesh = self._drawn or self._redraw()
         return MapState(self._mapper.stations, self._mapper.grid, filled, mesh)
+
+    @property
+    def whole(self) -> MapState:
+        """The map as it is, with its evidence mixed over the poses: for files, since it takes seconds."""
+        return replace(self.state, mixture=self._mapper.mixture())
 
     def snapshots(self) -> list[Snapshot]:
         """Return the whole state as snapshots, for who begins to listen now; the next grid is a delta to this."""

@@ -11,17 +11,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fill.values import Filled, Mesh
+from mapping.ensemble import Mixture
 from mapping.values import Grid, Station
 
 
 @dataclass(frozen=True, slots=True)
 class MapState:
-    """What is known at one moment: stations in the order of their scans, evidence, fills and surface."""
+    """What is known at one moment: stations in the order of their scans, evidence, fills and surface.
+
+    ``mixture`` is the evidence mixed over the poses, None while the map still grows.
+    """
 
     stations: tuple[Station, ...]
     grid: Grid
     filled: Filled
     mesh: Mesh
+    mixture: Mixture | None = None
 
 
 def grid_digest(grid: Grid) -> str:

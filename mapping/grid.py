@@ -96,14 +96,20 @@ def gather(scans: Sequence[Cells], config: Map) -> Grid:
     south, north = min(int(s.row.min()) for s in told), max(int(s.row.max()) for s in told)
     west, east = min(int(s.col.min()) for s in told), max(int(s.col.max()) for s in told)
     shape = (north - south + 1, east - west + 1)
+    log_odds = added(told, shape, (south, west)).astype(np.float32)
+    return trim(np.pad(log_odds, MARGIN_CELLS), (south, west), config)
+
+
+def added(scans: Sequence[Cells], shape: tuple[int, ...], corner: tuple[int, int]) -> NDArray[np.float64]:
+    """Add up log-odds, clamped, into ``shape`` rows and columns from ``corner``, the row and column of its first."""
     total, hints = np.zeros(shape[0] * shape[1]), np.zeros(shape[0] * shape[1])
-    for scan in told:
-        cell = (scan.row - south) * shape[1] + (scan.col - west)
+    for scan in scans:
+        cell = (scan.row - corner[0]) * shape[1] + (scan.col - corner[1])
         hint = (scan.log_odds > 0.0) & (scan.log_odds <= HINT_LOG_ODDS)
         total[cell] += np.where(hint, 0.0, scan.log_odds)
         hints[cell] = np.maximum(hints[cell], np.where(hint, scan.log_odds, 0.0))
-    log_odds = np.clip(np.where(total >= 0.0, np.maximum(total, hints), total), CLAMP_FREE, CLAMP_OCCUPIED)
-    return trim(np.pad(log_odds.reshape(shape).astype(np.float32), MARGIN_CELLS), (south, west), config)
+    told = np.where(total >= 0.0, np.maximum(total, hints), total)
+    return np.clip(told, CLAMP_FREE, CLAMP_OCCUPIED).reshape(shape)
 
 
 def trim(log_odds: NDArray[np.float32], corner: tuple[int, int], config: Map) -> Grid:

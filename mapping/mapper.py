@@ -5,6 +5,7 @@ from __future__ import annotations
 from config.schema import Map
 from mapping import grid as grids
 from mapping.echoes import pick
+from mapping.ensemble import Mixture
 from mapping.prior import Hint
 from mapping.sight import sight_of
 from mapping.stations import Stations
@@ -42,6 +43,10 @@ class Mapper:
         found = self._stations.drop(index)
         self._grid = self._stations.grid()
         return found
+
+    def mixture(self) -> Mixture:
+        """Mix the evidence over the places that the stations may have: occupancy, and how sure a wall's place is."""
+        return self._stations.mixture()
 
     @property
     def stations(self) -> tuple[Station, ...]:

@@ -15,6 +15,7 @@ import numpy as np
 
 from config.schema import Map
 from mapping.chart import Charts
+from mapping.ensemble import DRAWS, Mixture, draw, mix
 from mapping.graph import put_at, seen_from
 from mapping.grid import Canvas
 from mapping.hypotheses import ASKED, lies
@@ -83,6 +84,19 @@ class Stations:
         """Draw the evidence of the stations of the map that show the same plan as the first."""
         plans = self.plans()
         return self._draw(plans[0] if plans else ())
+
+    def mixture(self) -> Mixture:
+        """Mix the evidence over the places that the stations may have; this takes long, for a map that is done."""
+        plans = self.plans()
+        if not plans:
+            return mix(self.grid(), [], np.zeros((DRAWS, 0, 3)))
+        solution = self._pieces.solution(plans[0][0])
+        at = np.array([solution.stations.index(k) for k in plans[0]])
+        off = draw(solution.covariance, np.random.default_rng([self._config.seed, len(self._sights)]))[:, at]
+        placed = [
+            (self._told[k].pose, self._canvas.cells(self._told[k].pose, self._sights[k].evidence)) for k in plans[0]
+        ]
+        return mix(self.grid(), placed, off)
 
     def plans(self) -> list[list[int]]:
         """Sort the stations of the map by the plan that they show: wells taper."""

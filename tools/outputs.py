@@ -19,6 +19,7 @@ from daemon.state import MapState, grid_digest, mesh_digest, poses_digest
 from daemon.swing import compass_facts
 from drivers.records import Json
 from fill.values import Filled
+from mapping.ensemble import Mixture
 from mapping.values import FREE, OCCUPIED
 from tools.files import make_folder, replace_file
 from tools.maps import state_shades, write_map
@@ -44,6 +45,8 @@ def write_outputs(
     make_folder(folder)
     write_map(folder, "map", state.grid, state_shades(state.grid.state), yaw_rad)
     write_map(folder, "filled", state.grid, fill_shades(state.filled), yaw_rad)
+    if state.mixture is not None:
+        write_map(folder, "certainty", state.grid, mixed_shades(state.mixture), yaw_rad)
     replace_file(folder / "fills.csv", fills_csv(state.filled))
     replace_file(folder / "holes.csv", holes_csv(state.filled))
     if poses:
@@ -66,6 +69,11 @@ def fill_shades(filled: Filled) -> NDArray[np.uint8]:
     return shades
 
 
+def mixed_shades(mixture: Mixture) -> NDArray[np.uint8]:
+    """Grey levels ``(rows, cols)`` of ``certainty.pgm``: the surer a wall wherever the stations are, the darker."""
+    return np.asarray(np.rint(255.0 * (1.0 - mixture.probability)), dtype=np.uint8)
+
+
 def report(state: MapState, origin: Provenance) -> dict[str, Json]:
     """Return the facts of ``report.json``: counts, sizes, versions, digests, damage."""
     return {
@@ -76,7 +84,7 @@ def report(state: MapState, origin: Provenance) -> dict[str, Json]:
         "damage": origin.damage,
         "versions": _versions(origin),
         "stations": dict(Counter[str](station.status for station in state.stations)),
-        "pieces": len({station.piece for station in state.stations if station.status == "placed"}),
+        **_piece_facts(state),
         "compass": compass_facts(state.stations),
         "grid": _grid_facts(state),
         "fills": _fill_facts(state.filled),
@@ -107,6 +115,20 @@ def _grid_facts(state: MapState) -> dict[str, Json]:
         "free_cells": int(np.count_nonzero(grid.state == FREE)),
         "free_m2": round(float(np.count_nonzero(grid.state == FREE) * area_m2), 4),
     }
+
+
+def _piece_facts(state: MapState) -> dict[str, Json]:
+    """Tell which scans lie in pieces that nothing ties to the map, and how sure the place of its walls is."""
+    floating: dict[str, Json] = {}
+    held = [station for station in state.stations if station.status != "dropped"]
+    for number in sorted({station.piece for station in held} - {0}):
+        floating[str(number)] = [station.scan.index for station in held if station.piece == number]
+    facts: dict[str, Json] = {"pieces": len({station.piece for station in held}), "floating": floating}
+    if state.mixture is not None:
+        sd_m = state.mixture.sd_m[state.grid.state == OCCUPIED]
+        quantiles = np.percentile(sd_m, [50, 95]) if len(sd_m) else np.zeros(2)
+        facts["wall_sd_m"] = {"median": round(float(quantiles[0]), 4), "95": round(float(quantiles[1]), 4)}
+    return facts
 
 
 def _fill_facts(filled: Filled) -> dict[str, Json]:

@@ -70,7 +70,7 @@ def replay(files: list[Path], config: Config, *watches: Watch) -> tuple[MapState
         for watch in watches:
             watch(record, told)
     pipeline.finish()
-    return pipeline.state, damage
+    return pipeline.whole, damage
 
 
 def write_results(folder: Path, state: MapState, config: Config, files: list[Path], damage: Damage) -> dict[str, Json]:
