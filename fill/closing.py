@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -14,14 +15,16 @@ from scipy import ndimage
 from fill.candidates import Candidate
 from fill.freedom import capped
 from fill.logistic import Logistic
-from fill.matching import assign, candidates, gain
-from fill.segments import EIGHT, Walls, find_walls
+from fill.matching import asked, assign, candidates, gain
+from fill.memory import Box, Memory, content
+from fill.segments import EIGHT, End, Walls
+from fill.settling import settle
 from mapping.values import OCCUPIED, UNKNOWN
 
-THRESHOLD: Final = 0.35
+THRESHOLD: Final = 0.25
 """A fill less likely right than this is not drawn: the end stays open."""
-_FIRST_ROUND: Final = 4.0  # cells
-_WIDER: Final = 3.0  # each round reaches so much further
+CAP: Final = 6  # cells before an end that tell whether it was seen to be the end
+_SMALL: Final = 12.0  # cells: gaps that are closed before any larger one is looked at
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,68 +44,86 @@ class Closed:
 
 
 def close_holes(
-    state: NDArray[np.uint8], longest: float, model: Logistic, threshold: float = THRESHOLD
-) -> list[Closed]:
-    """Close the holes of ``state`` ``(rows, cols)`` up to ``longest`` cells."""
+    state: NDArray[np.uint8], longest: float, model: Logistic, threshold: float = THRESHOLD,
+    memory: Memory | None = None,
+) -> list[Closed]:  # fmt: skip
+    """Close the holes of ``state`` ``(rows, cols)`` up to ``longest`` cells; ``memory`` spares work done before."""
+    memory = memory or Memory()
     wall = state == OCCUPIED
-    walls = open_walls(wall, state)
+    walls = open_walls(wall, state, memory)
     closed: list[Closed] = []
     for reach in _rounds(longest):
-        fresh = _close_round(candidates(walls, state, reach), model, threshold, state, wall)
-        if fresh:
-            walls = open_walls(wall, state)
+        fresh = _close_round(candidates(walls, state, reach, memory), model, threshold, state, wall, memory)
+        walls = open_walls(wall, state, memory)
         closed += fresh
     return closed
 
 
-def open_ends(state: NDArray[np.uint8], closed: list[Closed]) -> NDArray[np.float64]:
+def open_ends(state: NDArray[np.uint8], closed: list[Closed], memory: Memory | None = None) -> NDArray[np.float64]:
     """Return the ends of walls ``(n, 2)``, x and y in cells, that are still open with these holes closed."""
     wall = state == OCCUPIED
     for each in closed:
         wall[each.cells[:, 0], each.cells[:, 1]] = True
-    return np.array([(end.x, end.y) for end in open_walls(wall, state).ends]).reshape(-1, 2)
+    return np.array([(end.x, end.y) for end in open_walls(wall, state, memory or Memory()).ends]).reshape(-1, 2)
 
 
-def open_walls(wall: NDArray[np.bool_], state: NDArray[np.uint8]) -> Walls:
+def open_walls(wall: NDArray[np.bool_], state: NDArray[np.uint8], memory: Memory | None = None) -> Walls:
     """Find the walls, and of their ends those that were not seen to be the end."""
-    walls = find_walls(wall)
-    return dataclasses.replace(walls, ends=tuple(end for end in walls.ends if not capped(end, state)))
+    memory = memory or Memory()
+    walls = memory.walls(wall, state)
+
+    capped_there = (memory.recall(("capped", content(end)), partial(_capped, end, state)) for end in walls.ends)
+    ends = (end for end, shut in zip(walls.ends, capped_there, strict=True) if not shut)
+    return dataclasses.replace(walls, ends=tuple(ends))
+
+
+def _capped(end: End, state: NDArray[np.uint8]) -> tuple[Box, bool]:
+    row, col = round(end.y), round(end.x)
+    return (row - CAP, col - CAP, row + CAP + 1, col + CAP + 1), capped(end, state)
 
 
 def _close_round(
-    found: list[Candidate], model: Logistic, threshold: float, state: NDArray[np.uint8], wall: NDArray[np.bool_]
-) -> list[Closed]:
+    found: list[Candidate], model: Logistic, threshold: float, state: NDArray[np.uint8], wall: NDArray[np.bool_],
+    memory: Memory,
+) -> list[Closed]:  # fmt: skip
     """Take the best candidates, and mark their cells in ``wall``."""
     if not found:
         return []
     chances = model.chance(np.stack([each.features for each in found]))
+    by_end = _by_end(found)
     closed: list[Closed] = []
-    for index in assign(found, [gain(float(chance), threshold) for chance in chances]):
-        rivals = _rivals(found[index], found, chances)
-        for cells in fill_cells(found[index], state, wall):
-            closed.append(Closed(found[index], cells, _away(cells, found[index]), float(chances[index]), rivals))
+    gains = [gain(chance, asked(each, threshold)) for chance, each in zip(chances.tolist(), found, strict=True)]
+    for index in assign(found, gains):
+        rivals = _rivals(index, found, by_end, chances)
+        settled = settle(found[index], state, memory)
+        for cells in fill_cells(settled, state, wall):
+            closed.append(Closed(settled, cells, _away(cells, settled), float(chances[index]), rivals))
             wall[cells[:, 0], cells[:, 1]] = True
     return closed
 
 
+def _by_end(found: list[Candidate]) -> dict[int, list[int]]:
+    """Return for each end the candidates that it has."""
+    indices: dict[int, list[int]] = {}
+    for index, each in enumerate(found):
+        for end in {each.first, each.second} - {-1}:
+            indices.setdefault(end, []).append(index)
+    return indices
+
+
 def _rivals(
-    taken: Candidate, found: list[Candidate], chances: NDArray[np.float64]
+    taken: int, found: list[Candidate], by_end: dict[int, list[int]], chances: NDArray[np.float64]
 ) -> tuple[tuple[Candidate, float], ...]:
     """Return the other candidates of the same ends, with their chances."""
-    ends = {taken.first, taken.second} - {-1}
-    shared = (
-        each
-        for each in zip(found, chances.tolist(), strict=True)
-        if not ends.isdisjoint((each[0].first, each[0].second))
-    )
-    return tuple((each, chance) for each, chance in shared if each is not taken)
+    ends = {found[taken].first, found[taken].second} - {-1}
+    shared = sorted({index for end in ends for index in by_end[end]} - {taken})
+    return tuple((found[index], float(chances[index])) for index in shared)
 
 
 def _rounds(longest: float) -> Iterator[float]:
-    reach = _FIRST_ROUND
-    while reach < longest:
-        yield reach
-        reach *= _WIDER
+    """Small gaps first: what closes them gives shape to the walls that large ones are closed between."""
+    if longest > _SMALL:
+        yield _SMALL
     yield longest
 
 

@@ -68,18 +68,18 @@ def curves(a: End, b: End, between: Chord) -> list[Curve]:
     """Curves from ``a`` to ``b``, the likeliest first."""
     found = []
     if between.turn > _CORNER_FROM:
-        found += _corner(a, b)
+        found += corner(a, b)
     if max(between.bend_a, between.bend_b) < _FLAT:
-        found.append(_polynomial(a, b))
-    found.append(_tangent(a, b, between))
+        found.append(polynomial(a, b))
+    found.append(tangent(a, b, between))
     if between.turn <= _CORNER_FROM:
-        found += _corner(a, b)
+        found += corner(a, b)
     return found
 
 
 def straight(x0: float, y0: float, x1: float, y1: float, name: str = "line") -> Curve:
     """Return the straight curve between two places."""
-    return Curve(name, _sampled(np.array([[x0, y0], [x1, y1]])))
+    return Curve(name, sampled(np.array([[x0, y0], [x1, y1]])))
 
 
 def bowed(curve: Curve, heights: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -97,7 +97,7 @@ def cells_of(points: NDArray[np.float64]) -> NDArray[np.int32]:
     return np.asarray(cells[fresh], np.int32)
 
 
-def _corner(a: End, b: End) -> list[Curve]:
+def corner(a: End, b: End) -> list[Curve]:
     """Both walls go on straight until they meet, where they do so ahead of both."""
     cross = a.dx * b.dy - a.dy * b.dx
     if abs(cross) < math.sin(_CORNER_FROM / 2):
@@ -109,10 +109,10 @@ def _corner(a: End, b: End) -> list[Curve]:
     if not (-1.5 <= from_a <= 1.5 * gap + 2 and -1.5 <= from_b <= 1.5 * gap + 2):
         return []
     meet = (a.x + a.dx * max(from_a, 0.0), a.y + a.dy * max(from_a, 0.0))
-    return [Curve("corner", _sampled(np.array([(a.x, a.y), meet, (b.x, b.y)])))]
+    return [Curve("corner", sampled(np.array([(a.x, a.y), meet, (b.x, b.y)])))]
 
 
-def _tangent(a: End, b: End, between: Chord) -> Curve:
+def tangent(a: End, b: End, between: Chord) -> Curve:
     """Cubic Hermite curve that leaves both walls along their own directions."""
     reach = between.gap * min(1.0, 1.0 / max(0.5, math.cos(between.turn / 4.0) ** 2))
     share = np.linspace(0.0, 1.0, max(8, int(between.gap / _STEP)))[:, None]
@@ -124,10 +124,10 @@ def _tangent(a: End, b: End, between: Chord) -> Curve:
         + (3 * share**2 - 2 * share**3) * finish
         + (share**3 - share**2) * into
     )
-    return Curve("tangent", _sampled(points))
+    return Curve("tangent", sampled(points))
 
 
-def _polynomial(a: End, b: End) -> Curve:
+def polynomial(a: End, b: End) -> Curve:
     """Polynomial through both walls in the frame of the chord; its order by Akaike's corrected criterion."""
     origin = np.array([a.x, a.y])
     ahead = np.array([b.x, b.y]) - origin
@@ -143,7 +143,7 @@ def _polynomial(a: End, b: End) -> Curve:
     # The curve starts and ends where the walls do: what it misses there is taken out in proportion.
     v = v - v[0] * (1.0 - u / max(gap, 1e-9)) - v[-1] * (u / max(gap, 1e-9))
     points = origin + np.stack([u, v], axis=1) @ frame.T
-    return Curve(("line", "quadratic", "cubic")[order - 1], _sampled(points))
+    return Curve(("line", "quadratic", "cubic")[order - 1], sampled(points))
 
 
 def _best_order(u: NDArray[np.float64], v: NDArray[np.float64]) -> tuple[int, NDArray[np.float64]]:
@@ -159,7 +159,7 @@ def _best_order(u: NDArray[np.float64], v: NDArray[np.float64]) -> tuple[int, ND
     return min(fits, key=lambda fit: fit[0])[1:]
 
 
-def _sampled(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def sampled(points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Resample a polyline at equal steps of a quarter cell."""
     steps = np.hypot(*np.diff(points, axis=0).T)
     length = np.concatenate([[0.0], np.cumsum(steps)])

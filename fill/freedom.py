@@ -7,7 +7,6 @@ crossed, nor slipped through between two free cells that touch at a corner.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -15,11 +14,6 @@ from numpy.typing import NDArray
 
 from fill.segments import End
 from mapping.values import FREE, UNKNOWN
-
-_NEAR: Final = 2.0  # cells from the wall's face where the sides are looked at, to
-_FAR: Final = 7.0
-_DENSE: Final = 4  # cells of water in a row that are water and not a stray ray
-_LOOKS: Final = 10  # places along a curve
 
 
 def at(state: NDArray[np.uint8], x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.uint8]:
@@ -59,36 +53,16 @@ _FAN: Final = np.array(
 ).T  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True)
-class Sides:
-    """What lies on either side of a curve, looked at square to it from ten places along it.
-
-    Left side first: ``near`` ``(2, 10)`` float64 is the share of free water two to seven cells off the wall's face,
-    ``snug`` ``(2, 10)`` of that within two cells, ``water`` ``(2, 10)`` bool whether the first thing seen, however far
-    within the reach, is free water and no stray ray.
-    """
-
-    near: NDArray[np.float64]
-    snug: NDArray[np.float64]
-    water: NDArray[np.bool_]
-
-
-def sides(points: NDArray[np.float64], half: float, state: NDArray[np.uint8], reach: float = _FAR) -> Sides:
-    """Look to both sides of a curve ``(n, 2)``, up to ``reach`` cells off the face of a wall of ``half`` thickness."""
-    pick = points[np.linspace(0, len(points) - 1, _LOOKS).astype(np.int64)]
-    ahead = np.gradient(pick, axis=0)
-    ahead /= np.maximum(np.hypot(ahead[:, 0], ahead[:, 1]), 1e-9)[:, None]
-    off = np.arange(1.0, max(reach, _FAR) + 1.0) + half - 0.5
-    lateral = np.array([1.0, -1.0])[:, None, None] * off
-    seen = at(state, pick[:, 0, None] - lateral * ahead[:, 1, None], pick[:, 1, None] + lateral * ahead[:, 0, None])
-    near = np.mean(seen[:, :, int(_NEAR) - 1 : int(_FAR)] == FREE, axis=2)
-    first = np.argmax(seen != UNKNOWN, axis=2)[:, :, None] + np.arange(_DENSE)
-    water = np.mean(np.take_along_axis(seen, np.minimum(first, len(off) - 1), axis=2) == FREE, axis=2) > 0.6
-    snug = np.mean(seen[:, :, :2] == FREE, axis=2)
-    return Sides(np.asarray(near, np.float64), np.asarray(snug, np.float64), np.asarray(water, np.bool_))
+def face(end: End, state: NDArray[np.uint8]) -> float:
+    """Share of free water close before and beside the face of an end."""
+    return float(np.mean(_before(end, state) == FREE))
 
 
 def capped(end: End, state: NDArray[np.uint8]) -> bool:
     """Whether the wall was seen to end: nothing unknown lies close before its end face."""
+    return not bool(np.any(_before(end, state) == UNKNOWN))
+
+
+def _before(end: End, state: NDArray[np.uint8]) -> NDArray[np.uint8]:
     x, y = end.x + _FAN[0] * end.dx - _FAN[1] * end.dy, end.y + _FAN[0] * end.dy + _FAN[1] * end.dx
-    return not bool(np.any(at(state, x, y) == UNKNOWN))
+    return at(state, x, y)

@@ -15,25 +15,28 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from fill.candidates import Candidate, across, dry, onto_side, opening
+from fill.candidates import FEATURES, Candidate, closer_partners
+from fill.memory import Memory
+from fill.recalling import recalled, ways_across, ways_onto_sides
+from fill.scene import look
 from fill.segments import Walls
 
-_PARTNERS: Final = 6  # candidates of an end that are worth drawing
+_PARTNERS: Final = 8  # candidates of an end that are worth drawing
+_WATER_BOTH: Final = FEATURES.index("water both")
+_WET: Final = 0.05  # of the way has water on both sides
+_PASSABLE: Final = 4.0  # cells; narrower gaps are no way through
+_WAY_THROUGH: Final = 0.6  # of ways and holes that look alike, a way walled up is the greater loss
 _EXACT: Final = 14  # up to so many candidates in conflict are solved exactly
 
 
-def candidates(walls: Walls, state: NDArray[np.uint8], longest: float) -> list[Candidate]:
+def candidates(walls: Walls, state: NDArray[np.uint8], longest: float, memory: Memory | None = None) -> list[Candidate]:
     """Every way to close a hole of up to ``longest`` cells that no free water forbids."""
-    found = []
-    for first, second in _pairs(walls, longest):
-        candidate = across(first, second, walls, state)
-        if candidate is not None and not opening(candidate) and not dry(candidate):
-            found.append(candidate)
-    for index in range(len(walls.ends)):
-        candidate = onto_side(index, walls, state, longest)
-        if candidate is not None and not opening(candidate) and not dry(candidate):
-            found.append(candidate)
-    return found
+    memory = memory or Memory()
+    scene = look(walls, state, memory.water(state))
+    ways = [way for first, second in _pairs(walls, longest) for way in ways_across(first, second, scene, memory)]
+    ways += [way for index in range(len(walls.ends)) for way in ways_onto_sides(index, scene, longest, memory)]
+    closer = closer_partners(ways)
+    return [recalled(way, each, scene, memory) for way, each in zip(ways, closer, strict=True)]
 
 
 def assign(found: Sequence[Candidate], gains: Sequence[float]) -> list[int]:
@@ -65,9 +68,9 @@ def _pairs(walls: Walls, longest: float) -> list[tuple[int, int]]:
     gap = np.maximum(np.hypot(apart[:, 0], apart[:, 1]), 1.0)
     ahead_a = np.sum(apart * aims[a], axis=1) / gap
     ahead_b = -np.sum(apart * aims[b], axis=1) / gap
-    # Over a few cells a direction is not known well: a slack of one and a half cells is granted.
-    slack = 1.5 / gap
-    fits = (ahead_a + slack > -0.2) & (ahead_b + slack > -0.2) & (ahead_a + ahead_b + slack > 0.4)
+    # Over a few cells a direction is not known well: a slack of two cells is granted.
+    slack = 2.0 / gap
+    fits = (ahead_a + slack > -0.5) & (ahead_b + slack > -0.5) & (ahead_a + ahead_b + slack > -0.1)
     price = gap * (2.0 - np.minimum(ahead_a, 1.0)) * (2.0 - np.minimum(ahead_b, 1.0))
     order = np.flatnonzero(fits)[np.lexsort((b[fits], a[fits], price[fits]))]
     used = np.zeros(len(ends), np.int64)
@@ -129,6 +132,12 @@ def _branch(order: list[int], rivals: dict[int, set[int]], gains: Sequence[float
         return best
     without = _branch(rest, rivals, gains)
     return best if best[0] >= without[0] else without
+
+
+def asked(candidate: Candidate, threshold: float) -> float:
+    """Return how likely right a fill must be; more is asked where one could pass and water was seen on both sides."""
+    wet = candidate.features[_WATER_BOTH] > _WET
+    return max(threshold, _WAY_THROUGH) if wet and candidate.gap > _PASSABLE else threshold
 
 
 def gain(chance: float, threshold: float) -> float:

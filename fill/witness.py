@@ -46,6 +46,8 @@ CELL_FEATURES: Final = (
 
 _FAR: Final = 12.0  # cells: further is all the same
 _SAME: Final = 1.5  # cells between two curves that pass the same cells
+SEEN: Final = 14
+"""Cells about a fill, beside the length of its gap, that witnesses look at."""
 _MARGIN: Final = 13
 _CLEARLY: Final = 1.5
 

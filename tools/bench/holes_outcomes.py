@@ -7,6 +7,7 @@ import zlib
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -14,85 +15,146 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from fill.certainty import design_of
+from fill.candidates import FEATURES
+from fill.certainty import DESIGN, design_of
 from fill.closing import close_holes, fill_cells, open_walls
+from fill.logistic import Logistic
 from fill.matching import candidates
-from fill.prior import prior
+from fill.scene import from_water
+from fill.settling import settled
 from fill.witness import distances, witness
-from mapping.values import OCCUPIED
+from mapping.values import FREE, OCCUPIED
 from tools.bench.holes_damage import damage
-from tools.bench.holes_loss import LONGEST, Damaged
+from tools.bench.holes_gates import shut
+from tools.bench.holes_loss import ELSEWHERE, LONGEST, UNJUDGED, Damaged
 from tools.bench.holes_maps import pieces, read_state, sources
+from tools.bench.holes_rooms import drawn_rooms
 from tools.bench.holes_sites import drawn_sites
 
 _REACH: Final = LONGEST + 2.0
 _EIGHT: Final = np.ones((3, 3), np.int8)
 _WORKERS: Final = 2
+_ROOMS: Final = 4
+_FAR: Final = 0.8  # what a candidate far from any loss is worth as a lesson, beside one of a hole
+_OPENING: Final = 3.0  # and one that would shut an opening
 
 
 @dataclass(frozen=True, slots=True)
-class Outcomes:
-    """Outcomes of one damaged piece of ``place``, a map or an emulated site.
-
-    ``candidates`` ``(n, k)`` by their features, and which of them were ``right`` ``(n,)``; ``cells`` ``(m, d)`` by
-    their design, which of them were ``cell_right`` ``(m,)``, of which ``fill`` ``(m,)``, and ``away`` ``(m,)`` cells
-    from what was measured.
-    """
+class Case:
+    """One damaged piece of ``place``, a real map or an emulated site."""
 
     place: str
     real: bool
-    candidates: NDArray[np.float64]
+    damaged: Damaged
+
+
+@dataclass(frozen=True, slots=True)
+class Tried:
+    """Candidates ``(n, k)`` of one case by their features, which of them were ``right`` ``(n,)``, and its ``worth``."""
+
+    features: NDArray[np.float64]
     right: NDArray[np.bool_]
-    cells: NDArray[np.float32]
-    cell_right: NDArray[np.bool_]
+    worth: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Filling:
+    """Cells filled in one case.
+
+    ``design`` ``(m, d)``, which of them were ``right`` ``(m,)``, of which ``fill`` ``(m,)``, and ``away`` ``(m,)``
+    cells from what was measured.
+    """
+
+    design: NDArray[np.float32]
+    right: NDArray[np.bool_]
     fill: NDArray[np.int64]
     away: NDArray[np.float64]
 
 
-def outcomes(data: Path, seeds: Sequence[int], count: int) -> list[Outcomes]:
-    """Damage ``count`` pieces of every map of the tune half and every emulated site, once a seed, and fill them."""
-    cases = [case for seed in seeds for case in _cases(data, seed, count)]
-    with ProcessPoolExecutor(_WORKERS, multiprocessing.get_context("spawn")) as pool:
-        return list(pool.map(outcome, cases, chunksize=4))
+def cases(data: Path, seeds: Sequence[int], count: int) -> list[Case]:
+    """Damage ``count`` pieces of every map of the tune half and one of every emulated site, once a seed."""
+    return [case for seed in seeds for case in _cases(data, seed, count)]
 
 
-def outcome(case: tuple[str, bool, Damaged]) -> Outcomes:
-    """Fill one damaged piece and judge every candidate and every filled cell near a loss."""
-    place, real, damaged = case
-    seen, wall = damaged.seen, damaged.seen == OCCUPIED
-    near = np.asarray(ndimage.binary_dilation(damaged.truth == OCCUPIED, _EIGHT), np.bool_)
-    walls = open_walls(wall, seen)
-    features, right = [], []
-    for each in candidates(walls, seen, _REACH):
-        for rows, cols in (part.T for part in fill_cells(each, seen, wall)[:1]):
-            if np.mean(damaged.owner[rows, cols] >= 0) > 0.5:
-                features.append(each.features)
-                right.append(bool(near[rows, cols].all()))
-    designs, cell_right, fill, away = [], [], [], []
-    for number, closed in enumerate(close_holes(seen, _REACH, prior().hole)):
+def tried(found: Sequence[Case]) -> list[Tried]:
+    """Judge every candidate, whatever would be made of it."""
+    with _pool() as pool:
+        return list(pool.map(_tried, found, chunksize=4))
+
+
+def filled(found: Sequence[Case], model: Logistic) -> list[Filling]:
+    """Close the holes with a model of candidates, and judge every filled cell near a loss."""
+    with _pool() as pool:
+        return list(pool.map(partial(_filled, model=model), found, chunksize=4))
+
+
+def _pool() -> ProcessPoolExecutor:
+    return ProcessPoolExecutor(_WORKERS, multiprocessing.get_context("spawn"))
+
+
+def _tried(case: Case) -> Tried:
+    damaged = case.damaged
+    seen, wall, near = damaged.seen, damaged.seen == OCCUPIED, _near(damaged)
+    water = from_water(seen)
+    features, verdicts = [], []
+    for each in candidates(open_walls(wall, seen), seen, _REACH):
+        parts = fill_cells(settled(each, seen, water), seen, wall)
+        verdict = _verdict(parts[0], damaged, near) if parts else None
+        if verdict is not None:
+            features.append(each.features)
+            verdicts.append(verdict)
+    right, worth = np.array(verdicts, np.float64).reshape(-1, 2).T
+    return Tried(np.array(features).reshape(-1, len(FEATURES)), right > 0.5, worth)
+
+
+def _verdict(cells: NDArray[np.int32], damaged: Damaged, near: NDArray[np.bool_]) -> tuple[bool, float] | None:
+    """Whether a fill is right, and what that is worth; None where too much is gone to judge."""
+    rows, cols = cells.T
+    loss = int(np.bincount(damaged.owner[rows, cols] - UNJUDGED).argmax()) + UNJUDGED
+    if loss == UNJUDGED:
+        return None
+    if loss == ELSEWHERE:
+        return False, _FAR
+    if damaged.losses[loss].opening:
+        solid = damaged.truth != FREE
+        solid[rows, cols] = True
+        if shut(damaged.losses[loss].banks, solid):
+            return False, _OPENING
+    return bool(near[rows, cols].all()), 1.0
+
+
+def _filled(case: Case, model: Logistic) -> Filling:
+    damaged = case.damaged
+    seen, near = damaged.seen, _near(damaged)
+    designs, right, fill, away = (
+        [np.zeros((0, len(DESIGN)))],
+        [np.zeros(0, bool)],
+        [np.zeros(0, np.int64)],
+        [np.zeros(0)],
+    )
+    for number, closed in enumerate(close_holes(seen, _REACH, model)):
         rows, cols = closed.cells.T
         ours = damaged.owner[rows, cols] >= 0
         hole, cells = witness(closed, seen)
         designs.append(design_of(hole, cells)[ours])
-        cell_right.append(near[rows, cols][ours])
+        right.append(near[rows, cols][ours])
         fill.append(np.full(int(ours.sum()), number))
         away.append(distances(closed, cells)[ours])
-    return Outcomes(
-        place, real, np.array(features), np.array(right, bool), _joined(designs).astype(np.float32),
-        _joined(cell_right).astype(bool), _joined(fill).astype(np.int64), _joined(away),
-    )  # fmt: skip
+    design, told = np.concatenate(designs).astype(np.float32), np.concatenate(right)
+    return Filling(design, told, np.concatenate(fill), np.concatenate(away))
 
 
-def _joined(parts: list[NDArray[np.float64]]) -> NDArray[np.float64]:
-    return np.concatenate(parts) if parts else np.zeros(0)
+def _near(damaged: Damaged) -> NDArray[np.bool_]:
+    return np.asarray(ndimage.binary_dilation(damaged.truth == OCCUPIED, _EIGHT), np.bool_)
 
 
-def _cases(data: Path, seed: int, count: int) -> Iterator[tuple[str, bool, Damaged]]:
+def _cases(data: Path, seed: int, count: int) -> Iterator[Case]:
     maps = ((source.name, True, read_state(source.path)) for source in sources(data, "tune"))
-    sites = ((name, False, state) for name, state in drawn_sites(np.random.default_rng(seed)))
+    random = np.random.default_rng(seed)
+    sites = ((name, False, state) for name, state in (*drawn_sites(random), *drawn_rooms(_ROOMS, random)))
     for place, real, state in (*maps, *sites):
         random = np.random.default_rng([seed, zlib.crc32(place.encode())])
         for number, piece in enumerate(pieces(state, count if real else 1, random)):
             damaged = damage(f"{place}-{number}", piece, random)
             if damaged.losses:
-                yield place, real, damaged
+                yield Case(place, real, damaged)

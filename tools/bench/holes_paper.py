@@ -1,14 +1,15 @@
 """The paper's own measure (Forrester et al. 2013, Table 1): of the cells that were filled, how many had been occupied.
 
-Three readings, on pieces of real maps as large as the paper's grids, cell for cell and without tolerance: the paper's,
-in which the method is told where the ends of the hole are, it learns and is judged on the same site, and only middles
-of long segments are knocked out; and two blind ones, in which a third as much of a wall is knocked out as stands on
-either side, and the paper's whole loop or ours has to find, match and fill.  Misses do not count in any of them, and
-thick walls forgive: their mean thickness stands beside.
+On emulated sites of the kinds that the paper has, and on pieces of real maps as large as its grids, cell for cell and
+without tolerance.  In the paper's sense the method is told where the ends of the hole are: its own polynomials learn
+and are judged on middles of long segments, and ours fills pieces of walls that leave at least six cells on both sides.
+Blind, the paper's whole loop or ours has to find, match and fill.  Misses do not count in any of them, and thick walls
+forgive: their mean thickness stands beside.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
@@ -20,8 +21,11 @@ from scipy import ndimage
 from fill.paper_curve import knock_outs
 from mapping.values import FREE, OCCUPIED, UNKNOWN
 from tools.bench.holes_maps import Source, read_state
-from tools.bench.holes_methods import Method, ours, paper_as_printed
+from tools.bench.holes_methods import ours, paper_as_printed
+from tools.bench.holes_sites import draw_site
+from tools.bench.holes_told import fill_told
 from tools.bench.holes_walk import centre_lines, walk_both_ways
+from tools.emulator.site import SITES
 
 Row = dict[str, str | int | float]
 
@@ -35,6 +39,18 @@ GRIDS: Final = {
     "Qanat": (562, 162, 0.68),
 }
 """Rows, columns and share of true positives of the paper's models, by their names."""
+_SITES: Final = {
+    "Case Cutietta": "house",
+    "College Garden": "hall",
+    "Gatto Pardo": "bell",
+    "Keyhole": "keyhole",
+    "Site 8": "cave",
+    "Tas Silg": "loop",
+    "Qanat": "gallery",
+}
+"""The emulated site of each model's kind."""
+_CELL_M: Final = 0.08
+_THICK: Final = 2
 _PUBLISHED_MEAN: Final = 0.83
 _HOLES: Final = 12
 _TRIES: Final = 20
@@ -52,14 +68,24 @@ class _Count:
 
 
 def measure_as_paper(maps: list[Source], seed: int) -> Iterator[Row]:
-    """Yield a row for each of the paper's grid sizes, taken from the maps in turn, and one for all."""
+    """Yield a row for each of the paper's models, on its emulated kind and on maps in turn, and one for all of each."""
     random = np.random.default_rng(seed)
+    turn = random.uniform(0.0, math.tau)
+    yield from _rows({name: (site, draw_site(SITES[site](), _CELL_M, turn, _THICK, random))
+                      for name, site in _SITES.items()}, random)  # fmt: skip
     states = [read_state(source.path) for source in maps]
-    rows = []
-    for number, (name, (high, wide, published)) in enumerate(GRIDS.items()):
+    windows = {}
+    for number, (name, (high, wide, _)) in enumerate(GRIDS.items()):
         index = number % len(maps)
-        rows.append(_measured(_window(states[index], high, wide, random), random))
-        yield {"size_of": name, "map": maps[index].name, "published": published, **rows[-1]}
+        windows[name] = maps[index].name, _window(states[index], high, wide, random)
+    yield from _rows(windows, random)
+
+
+def _rows(grids: dict[str, tuple[str, NDArray[np.uint8]]], random: np.random.Generator) -> Iterator[Row]:
+    rows = []
+    for name, (place, state) in grids.items():
+        rows.append(_measured(state, random))
+        yield {"size_of": name, "map": place, "published": GRIDS[name][2], **rows[-1]}
     keys = dict.fromkeys(key for row in rows for key in row)
     mean = {key: round(float(np.mean([row[key] for row in rows if key in row])), 3) for key in keys}
     yield {"size_of": "mean", "map": "all", "published": _PUBLISHED_MEAN, **mean}
@@ -71,23 +97,29 @@ def _measured(state: NDArray[np.uint8], random: np.random.Generator) -> dict[str
     depth = ndimage.distance_transform_edt(wall)[centre_lines(wall)]
     thickness = 2.0 * float(depth.mean()) - 1.0 if len(depth) else float("nan")
     shares = {"thickness": thickness, "paper, ends told": told.positives}
-    counts: dict[str, list[_Count]] = {"paper, blind": [], "ours, blind": []}
+    counts: dict[str, list[_Count]] = {"ours, ends told": [], "paper, blind": [], "ours, blind": []}
     for _ in range(_ROUNDS):
         seen, gone = _knocked_out(state, random)
-        for name, method in zip(counts, (paper_as_printed, ours), strict=True):
-            counts[name].append(_counted(method, seen, gone, wall))
+        for name, filled in (
+            ("ours, ends told", fill_told(seen, gone)),
+            ("paper, blind", paper_as_printed(seen).filled),
+            ("ours, blind", ours(seen).filled),
+        ):
+            counts[name].append(_counted(filled, seen, gone, wall))
     for name, found in counts.items():
-        filled = sum(each.filled for each in found)
-        shares[name] = sum(each.right for each in found) / filled if filled else float("nan")
+        total = sum(each.filled for each in found)
+        shares[name] = sum(each.right for each in found) / total if total else float("nan")
     return {key: round(value, 3) for key, value in shares.items() if not np.isnan(value)}
 
 
-def _counted(method: Method, seen: NDArray[np.uint8], gone: NDArray[np.bool_], wall: NDArray[np.bool_]) -> _Count:
+def _counted(
+    proposed: NDArray[np.bool_], seen: NDArray[np.uint8], gone: NDArray[np.bool_], wall: NDArray[np.bool_]
+) -> _Count:
     """Cells filled about what was knocked out, and those of them that had been wall."""
     if not gone.any():
         return _Count(0, 0)
     about = ndimage.distance_transform_edt(~gone) <= _APART / 2
-    filled = method(seen).filled & about & (seen != OCCUPIED)
+    filled = proposed & about & (seen != OCCUPIED)
     return _Count(int((filled & wall).sum()), int(filled.sum()))
 
 

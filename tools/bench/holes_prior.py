@@ -7,6 +7,7 @@ it together), and the figures are over all of them.  What is written is fitted t
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,15 +18,15 @@ from numpy.typing import NDArray
 
 from fill.candidates import FEATURES
 from fill.certainty import DESIGN, HIGHEST, LOWEST, falling, log_odds, whole_features
-from fill.logistic import sigmoid
-from tools.bench.holes_outcomes import Outcomes, outcomes
+from fill.logistic import Logistic, sigmoid
+from tools.bench.holes_outcomes import Case, Filling, Tried, cases, filled, tried
 from tools.files import replace_file
 
 Row = dict[str, str | int | float]
 Floats = NDArray[np.float64]
 
 _RIDGE_CELLS: Final = 10.0
-_RIDGE_HOLES: Final = 3.0
+_RIDGE_HOLES: Final = 5.0
 _STEPS: Final = 12
 _TAIL: Final = 0.002  # of what was seen lies beyond either edge of the learnt range
 _LEAST_SD: Final = (0.2, 0.1)  # sites differ at least so much in level and slope
@@ -58,13 +59,16 @@ class Tables:
 
 def fit_prior(data: Path, seeds: Sequence[int], pieces: int, out: Path) -> Iterator[Row]:
     """Collect outcomes, yield figures of places left out, and write the tables fitted to all as a Python module."""
-    found = outcomes(data, seeds, pieces)
-    holes, cells = _hole_task(found), _cell_task(found)
+    found = cases(data, seeds, pieces)
+    holes = _hole_task(found, tried(found))
     yield _figures("candidates", holes, left_out(holes))
+    weights = fitted(holes)
+    fillings = filled(found, Logistic(weights, np.eye(len(weights))))
+    fills = _fills(fillings)
+    cells = _cell_task(found, fillings, fills)
     told = left_out(cells)
     yield _figures("cells", cells, told)
-    fills = _fills(found)
-    fallen = _fallen(told, fills, np.concatenate([each.away for each in found]))
+    fallen = _fallen(told, fills, np.concatenate([each.away for each in fillings]))
     yield _figures("cells, falling", cells, fallen)
     whole = _whole_task(cells, fills, fallen)
     yield _figures("whole fills", whole, left_out(whole))
@@ -75,8 +79,9 @@ def fit_prior(data: Path, seeds: Sequence[int], pieces: int, out: Path) -> Itera
         "slope_sd": round(spread[1, 1] ** 0.5, 3),
     }
     low, high = np.quantile(cells.x, [_TAIL, 1.0 - _TAIL], axis=0)
-    tables = Tables(fitted(holes), fitted(cells), low, high, spread, fitted(whole))
-    replace_file(out, module(tables, found).encode())
+    tables = Tables(weights, fitted(cells), low, high, spread, fitted(whole))
+    facts = f"{len(holes.right)} candidates and {len(cells.right)} filled cells"
+    replace_file(out, module(tables, facts, sorted({each.place for each in found if each.real})).encode())
 
 
 def fitted(task: Task) -> Floats:
@@ -128,16 +133,14 @@ def site_covariance(task: Task, told: Floats) -> Floats:
     return np.diag(np.maximum(np.diag(scatter), np.array(_LEAST_SD) ** 2))
 
 
-def module(tables: Tables, found: list[Outcomes]) -> str:
+def module(tables: Tables, facts: str, places: Sequence[str]) -> str:
     """Return the tables as the text of a Python module."""
-    places = sorted({each.place for each in found if each.real})
-    candidates, cells = (sum(len(getattr(each, name)) for each in found) for name in ("right", "cell_right"))
     lines = [
         '"""Weights of the prior, written by ``lacuna bench holes --fit-prior``: do not edit.',
         "",
-        f"Fitted to {candidates} candidates and {cells} filled cells of {len(places)} real maps",
+        f"Fitted to {facts} of {len(places)} real maps",
         f"({', '.join(places)})",
-        "and nine emulated sites.",
+        "nine emulated sites and drawn floor plans.",
         '"""',
         "",
         "from __future__ import annotations",
@@ -161,18 +164,18 @@ def module(tables: Tables, found: list[Outcomes]) -> str:
     return "\n".join(lines)
 
 
-def _hole_task(found: list[Outcomes]) -> Task:
-    kept = [each for each in found if len(each.right)]
-    x, right = (np.concatenate([getattr(each, name) for each in kept]) for name in ("candidates", "right"))
-    return Task(x, right.astype(np.float64), np.ones(len(right)), *_places(kept, "right"), _RIDGE_HOLES)
+def _hole_task(found: list[Case], lessons: list[Tried]) -> Task:
+    x, right = (np.concatenate([getattr(each, name) for each in lessons]) for name in ("features", "right"))
+    sizes = [len(each.right) for each in lessons]
+    worth = np.concatenate([each.worth for each in lessons])
+    return Task(x, right.astype(np.float64), worth, *_places(found, sizes), _RIDGE_HOLES)
 
 
-def _cell_task(found: list[Outcomes]) -> Task:
-    kept = [each for each in found if len(each.cell_right)]
-    x, right = (np.concatenate([getattr(each, name) for each in kept]) for name in ("cells", "cell_right"))
-    sizes = np.bincount(_fills(found))
-    count = 1.0 / np.sqrt(sizes[_fills(found)])  # cells of one fill are right or wrong together
-    return Task(x.astype(np.float64), right.astype(np.float64), count, *_places(kept, "cell_right"), _RIDGE_CELLS)
+def _cell_task(found: list[Case], lessons: list[Filling], fills: NDArray[np.int64]) -> Task:
+    x, right = (np.concatenate([getattr(each, name) for each in lessons]) for name in ("design", "right"))
+    count = 1.0 / np.sqrt(np.bincount(fills)[fills])  # cells of one fill are right or wrong together
+    places = _places(found, [len(each.right) for each in lessons])
+    return Task(x.astype(np.float64), right.astype(np.float64), count, *places, _RIDGE_CELLS)
 
 
 def _whole_task(cells: Task, fills: NDArray[np.int64], told: Floats) -> Task:
@@ -183,14 +186,13 @@ def _whole_task(cells: Task, fills: NDArray[np.int64], told: Floats) -> Task:
     return Task(x, right, np.ones(len(right)), cells.place[starts], cells.real[starts], 1.0)
 
 
-def _places(found: list[Outcomes], name: str) -> tuple[NDArray[np.str_], NDArray[np.bool_]]:
-    sizes = [len(getattr(each, name)) for each in found]
+def _places(found: list[Case], sizes: list[int]) -> tuple[NDArray[np.str_], NDArray[np.bool_]]:
     return np.repeat([each.place for each in found], sizes), np.repeat([each.real for each in found], sizes)
 
 
-def _fills(found: list[Outcomes]) -> NDArray[np.int64]:
-    """Return the number of the fill of each cell ``(m,)`` over all outcomes."""
-    pairs = [np.stack([np.full(len(each.fill), index), each.fill], axis=1) for index, each in enumerate(found)]
+def _fills(lessons: list[Filling]) -> NDArray[np.int64]:
+    """Return the number of the fill of each cell ``(m,)`` over all cases."""
+    pairs = [np.stack([np.full(len(each.fill), index), each.fill], axis=1) for index, each in enumerate(lessons)]
     return np.asarray(np.unique(np.concatenate(pairs), axis=0, return_inverse=True)[1], np.int64).ravel()
 
 
@@ -219,10 +221,12 @@ def _figures(name: str, task: Task, told: Floats) -> Row:
 def _area(chance: Floats, right: Floats) -> float:
     """Area under the curve: how often a right one is told surer than a wrong one."""
     _, inverse, count = np.unique(chance, return_inverse=True, return_counts=True)
-    rank = (np.cumsum(count) - (count - 1) / 2.0)[inverse]
-    good, bad = float(right.sum()), float((1.0 - right).sum())
-    return float((rank[right > 0].sum() - good * (good + 1.0) / 2.0) / max(good * bad, 1.0))
+    rank: Floats = (np.cumsum(count) - (count - 1) / 2.0)[inverse]
+    good = float(np.sum(right))
+    bad = len(right) - good
+    summed = float(np.sum(rank[right > 0]))
+    return (summed - good * (good + 1.0) / 2.0) / max(good * bad, 1.0)
 
 
 def _sd(covariance: Floats, axis: int) -> float:
-    return round(float(covariance[axis, axis]) ** 0.5, 3)
+    return round(math.sqrt(float(covariance[axis, axis])), 3)

@@ -45,7 +45,8 @@ def draw_site(site: Site, cell_m: float, turn_rad: float, thick: int, random: np
     shape = tuple(np.ceil(high - low).astype(int)[::-1])
     water = np.zeros(shape, bool)
     for number, wall in enumerate(walls):
-        rows, cols = polygon(*(wall - low).T[::-1], shape)  # type: ignore[no-untyped-call]
+        x, y = (wall - low).T
+        rows, cols = polygon(y, x, shape)  # type: ignore[no-untyped-call]
         water[rows, cols] = number == 0
     rough = ndimage.gaussian_filter(random.normal(size=shape), 1.5) * 3.0 * float(random.choice(_ROUGH_M)) / cell_m
     inward = ndimage.distance_transform_edt(water)

@@ -1,0 +1,159 @@
+"""Ways to lead a wall across a hole: from one end to another, or from an end onto the side of a wall.
+
+Every way that crosses no free water is drawn, and those that run alike are drawn once; which of them is right is for
+the judgement of all (``matching``), not for the first that passes.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fill.channels import channels
+from fill.curves import Chord, Curve, bowed, cells_of, chord, corner, polynomial, straight, tangent
+from fill.freedom import at, clear_path
+from fill.scene import Scene
+from fill.segments import End
+from mapping.values import FREE
+
+_BOWS: Final = np.array([0.0, 1.0, -1.0, 2.0, -2.0, 3.0, -3.0])  # cells
+_FLAT: Final = 1.0  # radians off the chord up to which a wall is a function of the way along it
+_BENT: Final = math.radians(15.0)  # less is as good as straight
+_THROUGH: Final = 2  # cells of another wall, beside specks, that a way may pass
+_ALIKE: Final = 1.2  # cells between ways that are the same
+_PLACES: Final = 12  # of a way that are compared
+_GLANCES: Final = np.radians(np.arange(-60.0, 61.0, 7.5))
+_SIDES: Final = 3  # places on the sides of walls that an end is led to
+_APART: Final = 4.0  # cells between two such places
+_OWN: Final = 2.5  # cells beside an end where its own wall is not met
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """A way from end ``first`` to end ``second`` (-1: the side of a wall), ``ends`` being the two as they were found.
+
+    ``path`` ``(n, 2)`` int32 of row and column, joined edge to edge; ``bow`` the rank of the bow that let the curve
+    pass, or of the place on the side of a wall.
+    """
+
+    first: int
+    second: int
+    ends: tuple[End, End]
+    chord: Chord
+    curve: Curve
+    path: NDArray[np.int32]
+    bow: int
+
+
+def across(first: int, second: int, scene: Scene) -> list[Way]:
+    """Every way between two ends that crosses no free water."""
+    a, b = scene.ends[first], scene.ends[second]
+    between = chord(a, b)
+    heights = _BOWS[np.abs(_BOWS) <= 0.25 * between.gap + 1.0]
+    found: list[Way] = []
+    for curve in curves_between(a, b, between):
+        way = _first_clear(curve, heights, (first, second), (a, b), between, scene)
+        if way is not None and _new(way, found):
+            found.append(way)
+    for curve in [] if found else channels(a, b, scene):
+        path = _path(curve, (a, b), scene)
+        if path is not None:
+            way = Way(first, second, (a, b), between, curve, path, 0)
+            found += [way] if _new(way, found) else []
+    return found
+
+
+def onto_sides(index: int, scene: Scene, longest: float) -> tuple[list[Way], NDArray[np.float64]]:
+    """Let a wall go on until it meets another, or itself, at a place that is no end.
+
+    Returns the ways, and two corners ``(2, 2)``, x and y, of what was looked at.
+    """
+    a = scene.ends[index]
+    found = []
+    places, looked = _meets(a, scene, longest)
+    for rank, (x, y) in enumerate(places):
+        row, col = round(y), round(x)
+        gap = math.hypot(x - a.x, y - a.y)
+        into = (a.x - x) / gap, (a.y - y) / gap
+        half = min(float(scene.walls.half[row, col]) - 0.5, a.half)
+        b = End(x, y, *into, half, a.line, a.length, a.wander, int(scene.walls.label[row, col]))
+        curve = straight(a.x, a.y, x, y, "side")
+        path = _path(curve, (a, b), scene)
+        if path is not None:
+            found.append(Way(index, -1, (a, b), chord(a, b), curve, path, rank))
+    return found, looked
+
+
+def curves_between(a: End, b: End, between: Chord) -> list[Curve]:
+    """Curves from ``a`` to ``b``, the plainest first."""
+    steepest = max(between.bend_a, between.bend_b)
+    found = [straight(a.x, a.y, b.x, b.y)]
+    if steepest < _FLAT:
+        found.append(polynomial(a, b))
+    if max(between.turn, steepest) > _BENT:
+        found.append(tangent(a, b, between))
+    return found + corner(a, b)
+
+
+def _first_clear(
+    curve: Curve, heights: NDArray[np.float64], pair: tuple[int, int], ends: tuple[End, End], between: Chord,
+    scene: Scene,
+) -> Way | None:  # fmt: skip
+    """Return the least bow of a curve that passes."""
+    points = bowed(curve, heights)
+    crosses = np.any(at(scene.state, points[..., 0], points[..., 1]) == FREE, axis=1)
+    for rank in np.flatnonzero(~crosses).tolist():
+        bow = Curve(curve.name, points[rank])
+        path = _path(bow, ends, scene)
+        if path is not None:
+            return Way(*pair, ends, between, bow, path, rank)
+    return None
+
+
+def _path(curve: Curve, ends: tuple[End, End], scene: Scene) -> NDArray[np.int32] | None:
+    path = clear_path(cells_of(curve.points), scene.state)
+    if path is None:
+        return None
+    met = scene.walls.label[path[:, 0], path[:, 1]]
+    others = ~scene.speck[met] & (met != ends[0].wall) & (met != ends[1].wall)
+    return None if np.count_nonzero(others) > _THROUGH else path
+
+
+def _new(way: Way, found: list[Way]) -> bool:
+    """Whether a way leaves each of those found before by more than a cell somewhere."""
+    points = way.curve.points
+    places = points[np.linspace(0, len(points) - 1, _PLACES).astype(np.int64)]
+    for other in found:
+        apart = places[:, None] - other.curve.points[None, ::2]
+        if np.hypot(apart[..., 0], apart[..., 1]).min(axis=1).max() <= _ALIKE:
+            return False
+    return True
+
+
+def _meets(a: End, scene: Scene, longest: float) -> tuple[list[tuple[float, float]], NDArray[np.float64]]:
+    """Where walls are met first by looks ahead and aside with no free water before: x and y in cells, best first."""
+    along = np.arange(1.0, longest, 0.5)
+    turn = math.atan2(a.dy, a.dx) + _GLANCES[:, None]
+    x, y = a.x + along * np.cos(turn), a.y + along * np.sin(turn)
+    rows, cols = scene.state.shape
+    row, col = np.rint(y).astype(np.int64), np.rint(x).astype(np.int64)
+    inside = (row >= 0) & (row < rows) & (col >= 0) & (col < cols)
+    row, col = np.clip(row, 0, rows - 1), np.clip(col, 0, cols - 1)
+    label = scene.walls.label[row, col]
+    wall = inside & ~scene.speck[label] & ~((label == a.wall) & (along < _OWN))
+    first = np.argmax(~inside | (scene.state[row, col] == FREE) | wall, axis=1)
+    looks = np.arange(len(_GLANCES))
+    price = np.where(wall[looks, first], along[first] * (2.0 - np.cos(_GLANCES)) ** 2, np.inf)
+    found: list[tuple[float, float]] = []
+    for look in np.argsort(price, kind="stable").tolist():
+        if not np.isfinite(price[look]) or len(found) == _SIDES:
+            break
+        place = float(x[look, first[look]]), float(y[look, first[look]])
+        if all(math.hypot(place[0] - other[0], place[1] - other[1]) >= _APART for other in found):
+            found.append(place)
+    last = np.stack([x[looks, first], y[looks, first]])
+    return found, np.stack([np.minimum(last.min(axis=1), (a.x, a.y)), np.maximum(last.max(axis=1), (a.x, a.y))])
