@@ -19,14 +19,16 @@ MOST_MARGIN, MOST_FIT, LEAST_SD_M, MOST_HOLD = 30.0, 1.5, 0.02, 0.25
 """What lies beyond these makes a match no surer."""
 ACCEPT = 2.2
 """Log-odds from which a scan counts as placed: no more than one in two hundred is then wrong ..."""
-SEEN = 1.4
-"""... where the way was seen, so that there are few other places ..."""
 WIDE = 2.6
-"""... where it was followed, and lost: walls that tell it nothing tell less of the place too ..."""
+"""... where it is of a piece of which the map knows nothing ..."""
+SEEN = 4.5
+"""... where the way was seen, but not surely: what told it little tells little of the place too ..."""
 GAP = 4.5
 """... where neither the scan before nor the one after is placed: pillars repeat, and reach is no bound then ..."""
 LOST = 7.0
-"""... and where the way over the gap was followed, and lost: it led farther than anything that the map knows."""
+"""... and where the way was followed, and lost: along smooth walls a scan fits best where the vehicle did not move."""
+LEAST_MARGIN = 4.0
+"""However well a scan fits, what fits so nearly as well elsewhere is not placed."""
 DOUBT_MARGIN = 3.0
 BAD_OVERLAP, BAD_FIT = 0.35, 0.4
 """Below these the pilot is told that a scan fits badly."""
@@ -44,7 +46,8 @@ def judge(scan: Scan, match: Match, piece: int, prior: Prior, *, chained: bool) 
     ``chained`` tells that the scan before or the one after is of the piece.
     """
     sd_m = _sd_m(match)
-    sure = is_led(match) if prior.is_led else log_odds(match) >= _needed(prior, piece, chained=chained)
+    fits = match.margin >= LEAST_MARGIN and log_odds(match) >= _needed(prior, piece, chained=chained)
+    sure = is_led(match) if prior.is_led else fits
     status: Status = "placed"
     if not sure or sd_m > ACCEPT_SD_M or match.astray > ASTRAY:
         status, piece = "doubtful" if match.margin >= DOUBT_MARGIN else "unplaced", scan.index + 1
@@ -88,13 +91,11 @@ def nowhere(scan: Scan, config: Map, why: str) -> Station:
 
 def _needed(prior: Prior, piece: int, *, chained: bool) -> float:
     """Log-odds that a match needs: by whether the way was seen, or followed and lost."""
-    seen = prior.cloud is not None and prior.cloud.sd_m <= SEEN_SD_M
-    if seen:
-        return SEEN
-    lost = piece > 0 or prior.cloud is not None
+    if prior.cloud is not None:
+        return SEEN if prior.cloud.sd_m <= SEEN_SD_M else LOST
     if chained:
-        return WIDE if lost else ACCEPT
-    return LOST if lost else GAP
+        return WIDE if piece > 0 else ACCEPT
+    return LOST if piece > 0 else GAP
 
 
 def _why(status: Status, match: Match, sd_m: float) -> str:
