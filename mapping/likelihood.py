@@ -19,13 +19,13 @@ from mapping.view import LEVEL_M, LEVELS, View
 SIGMA_M = 0.08
 """Width of a wall without annealing."""
 ROUGH, PLAIN = 0, 1
-ON_WALL = ((1.97, 2.06), (3.44, 0.86))
+ON_WALL = ((1.9, 2.0), (3.2, 0.6))
 """What a point says on a wall: a rough or a plain one, where the wall is rough or plain."""
-BESIDE, BESIDE_M = (3.1, 0.02), 0.3
+BESIDE, BESIDE_M = (3.3, 0.3), 0.3
 """What a rough or a plain point says beside a wall, fading so far from it."""
-IN_WATER, WATER_M = (-1.65, -4.12), 0.1
+IN_WATER, WATER_M = (-1.2, -4.5), 0.1
 """What it says in open water, from so far from walls ..."""
-FAR_WATER, FAR_M = (-0.42, 1.17), 0.45
+FAR_WATER, FAR_M = (-0.35, 1.16), 0.45
 """... and what farther out is added: it may be a ghost."""
 FULL = 100.0
 """Points of a full scan; more of them err together and say no more."""

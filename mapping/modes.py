@@ -23,7 +23,7 @@ RIDGE_FLOOR = 8.0
 """... and the ridge goes on, beyond them, down to this below the best."""
 RIDGE_FAR_M = 3.0
 """A ridge is followed so far beyond the two."""
-RIDGE_TEMPER = 0.5
+RIDGE_TEMPER = 0.2
 """Power of the likelihood along a ridge: small differences between repeated walls tell little."""
 
 Floats = NDArray[np.float64]

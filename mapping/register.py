@@ -24,12 +24,29 @@ from mapping.prior import Prior
 from mapping.values import Pose
 from mapping.view import View, to_map
 
-SIGMAS_M = (0.5, 0.4, 0.3, 0.24, 0.19, 0.15, 0.12, 0.1, 0.08)
-"""Widths of a wall, from the first step of the filter to the last."""
-SECOND_LOOK_M = 0.24
-"""At this width the prior is asked once more: wide walls may lead to where little is known."""
-TEMPER = 0.5
-"""Power of the likelihood in resampling."""
+
+@dataclass(frozen=True, slots=True)
+class Level:
+    """A step of the filter: width of the walls, power of the likelihood, and particles as shares of their number.
+
+    ``fresh`` ones are drawn from the prior once more: wide walls may lead to where little is known.
+    """
+
+    sigma_m: float
+    power: float
+    kept: float
+    fresh: float = 0.0
+
+
+LEVELS = (
+    Level(0.4, 0.12, 1.0),
+    Level(0.3, 0.2, 1.0, fresh=0.5),
+    Level(0.2, 0.25, 1.0, fresh=0.5),
+    Level(0.15, 0.3, 0.7),
+    Level(0.1, 0.4, 0.5),
+    Level(0.08, 0.5, 0.5),
+)
+"""From wide walls to narrow ones; a power that is high too early loses a place that shows its worth only late."""
 JITTER_M = 0.5
 """Spread of resampled particles, as a share of the step's wall width; their headings likewise, per metre of lever."""
 LEVER_M = 4.0
@@ -110,13 +127,13 @@ def search(
 ) -> tuple[Floats, float]:
     """Anneal particles from the prior to the best pose ``(3,)``, not near barred ones, in place and in heading."""
     poses = prior.draw(particles, rng)
-    for sigma in SIGMAS_M:
-        if sigma == SECOND_LOOK_M:
-            poses = np.concatenate([poses, prior.draw(particles, rng)])
-        log_p = TEMPER * _bar(like.log_posterior(poses, sigma), poses, barred)
-        poses = poses[_resample(log_p, particles, rng)]
-        poses[:, :2] += rng.normal(0.0, JITTER_M * sigma, (particles, 2))
-        poses[:, 2] += rng.normal(0.0, JITTER_M * sigma / LEVER_M, particles)
+    for level in LEVELS:
+        n = max(int(particles * level.kept), 1)
+        poses = np.concatenate([poses, prior.draw(int(particles * level.fresh), rng)])
+        log_p = level.power * _bar(like.log_posterior(poses, level.sigma_m), poses, barred)
+        poses = poses[_resample(log_p, n, rng)]
+        poses[:, :2] += rng.normal(0.0, JITTER_M * level.sigma_m, (n, 2))
+        poses[:, 2] += rng.normal(0.0, JITTER_M * level.sigma_m / LEVER_M, n)
     for spread in (0.05, 0.025, 0.0125):
         log_p = _bar(like.log_posterior(poses), poses, barred)
         top = poses[int(np.argmax(log_p))]

@@ -15,8 +15,10 @@ from mapping.values import Pose, Returns
 
 THIN_M = 0.1
 """One point per square of this side: walls near a station are sampled more densely than others."""
-NORMAL_M = 0.35
-"""Points within this tell the wall's direction."""
+NORMAL_M, FEW_NEAR = 0.35, 3
+"""Points within this tell the wall's direction, if there are so many ..."""
+SPARSE, SPARSE_M, SPARSE_LENGTH = 4, 1.5, 0.97
+"""... or else so many others, within this, that lie on a line: by the difference of their variances over the sum."""
 EVEN = 0.8
 """Exponent by which common wall directions are weighted down: two long walls must not drown the end wall."""
 NORMAL_SPREAD_RAD = math.radians(12.0)
@@ -93,16 +95,30 @@ def thin(xy_m: NDArray[np.float64], trust: NDArray[np.float64]) -> tuple[NDArray
 
 
 def normals(xy_m: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Direction of the wall's normal at each point ``(n,)`` in [0, pi), nan where too few points tell it."""
-    apart = xy_m[:, None, :] - xy_m[None, :, :]
-    near = (apart**2).sum(axis=2) < NORMAL_M**2
+    """Direction of the wall's normal at each point ``(n,)`` in [0, pi), nan where no plain wall is seen there.
+
+    A wall seen at a slant is seen in few points far apart: where there are few nearby, the nearest few tell it, if
+    they lie on a line.
+    """
+    n = len(xy_m)
+    near = _near(xy_m)
+    lonely = near.sum(axis=1) < FEW_NEAR
+    if n > SPARSE and lonely.any():
+        square_m2 = ((xy_m[lonely, None, :] - xy_m[None, :, :]) ** 2).sum(axis=2)
+        reach_m2 = np.partition(square_m2, SPARSE, axis=1)[:, SPARSE]
+        near[lonely] = square_m2 <= np.minimum(reach_m2, SPARSE_M**2)[:, None]
     count = near.sum(axis=1)
     mean = near @ xy_m / np.maximum(count, 1)[:, None]
     square = near @ (xy_m[:, :, None] * xy_m[:, None, :]).reshape(-1, 4) / np.maximum(count, 1)[:, None]
     cov = square.reshape(-1, 2, 2) - mean[:, :, None] * mean[:, None, :]
     along = 0.5 * np.arctan2(2.0 * cov[:, 0, 1], cov[:, 0, 0] - cov[:, 1, 1])
-    longish = np.hypot(2.0 * cov[:, 0, 1], cov[:, 0, 0] - cov[:, 1, 1]) > 0.5 * (cov[:, 0, 0] + cov[:, 1, 1])
-    return np.where((count >= 3) & longish, (along + 0.5 * math.pi) % math.pi, np.nan)
+    length = np.hypot(2.0 * cov[:, 0, 1], cov[:, 0, 0] - cov[:, 1, 1]) / np.maximum(cov[:, 0, 0] + cov[:, 1, 1], 1e-12)
+    longish = length > np.where(lonely, SPARSE_LENGTH, 0.5)
+    return np.where((count >= np.where(lonely, SPARSE, FEW_NEAR)) & longish, (along + 0.5 * math.pi) % math.pi, np.nan)
+
+
+def _near(xy_m: NDArray[np.float64]) -> NDArray[np.bool_]:
+    return np.asarray(((xy_m[:, None, :] - xy_m[None, :, :]) ** 2).sum(axis=2) < NORMAL_M**2)
 
 
 def even_weights(normal_rad: NDArray[np.float64], trust: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -128,7 +144,9 @@ def codes_of(field: Field, points: Points) -> NDArray[np.uint8]:
     level = np.minimum(field.distance_m / LEVEL_M + 0.5, LEVELS - 1).astype(np.uint8)
     rough = ~np.isfinite(points.normal_rad)
     nearer = _stamped(field, points.xy_m[rough]) < _stamped(field, points.xy_m[~rough])
-    return (level + np.uint8(LEVELS) * field.free + np.uint8(2 * LEVELS) * nearer).ravel().astype(np.uint8)
+    codes = (level + np.uint8(LEVELS) * field.free + np.uint8(2 * LEVELS) * nearer).astype(np.uint8)
+    codes[[0, -1], :] = codes[:, [0, -1]] = LEVELS - 1  # and all beyond: nothing is known
+    return codes.ravel()
 
 
 def _stamped(field: Field, xy_m: NDArray[np.float64]) -> NDArray[np.float32]:
