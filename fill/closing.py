@@ -18,7 +18,6 @@ from fill.logistic import Logistic
 from fill.matching import asked, assign, candidates, gain
 from fill.memory import Box, Memory, content
 from fill.segments import EIGHT, End, Walls
-from fill.settling import settle
 from mapping.values import OCCUPIED, UNKNOWN
 
 THRESHOLD: Final = 0.25
@@ -53,7 +52,7 @@ def close_holes(
     walls = open_walls(wall, state, memory)
     closed: list[Closed] = []
     for reach in _rounds(longest):
-        fresh = _close_round(candidates(walls, state, reach, memory), model, threshold, state, wall, memory)
+        fresh = _close_round(candidates(walls, state, reach, memory), model, threshold, state, wall)
         walls = open_walls(wall, state, memory)
         closed += fresh
     return closed
@@ -83,9 +82,8 @@ def _capped(end: End, state: NDArray[np.uint8]) -> tuple[Box, bool]:
 
 
 def _close_round(
-    found: list[Candidate], model: Logistic, threshold: float, state: NDArray[np.uint8], wall: NDArray[np.bool_],
-    memory: Memory,
-) -> list[Closed]:  # fmt: skip
+    found: list[Candidate], model: Logistic, threshold: float, state: NDArray[np.uint8], wall: NDArray[np.bool_]
+) -> list[Closed]:
     """Take the best candidates, and mark their cells in ``wall``."""
     if not found:
         return []
@@ -95,9 +93,8 @@ def _close_round(
     gains = [gain(chance, asked(each, threshold)) for chance, each in zip(chances.tolist(), found, strict=True)]
     for index in assign(found, gains):
         rivals = _rivals(index, found, by_end, chances)
-        settled = settle(found[index], state, memory)
-        for cells in fill_cells(settled, state, wall):
-            closed.append(Closed(settled, cells, _away(cells, settled), float(chances[index]), rivals))
+        for cells in fill_cells(found[index], state, wall):
+            closed.append(Closed(found[index], cells, _away(cells, found[index]), float(chances[index]), rivals))
             wall[cells[:, 0], cells[:, 1]] = True
     return closed
 

@@ -20,8 +20,6 @@ from fill.certainty import DESIGN, design_of
 from fill.closing import close_holes, fill_cells, open_walls
 from fill.logistic import Logistic
 from fill.matching import candidates
-from fill.scene import from_water
-from fill.settling import settled
 from fill.witness import distances, witness
 from mapping.values import FREE, OCCUPIED
 from tools.bench.holes_damage import damage
@@ -95,10 +93,9 @@ def _pool() -> ProcessPoolExecutor:
 def _tried(case: Case) -> Tried:
     damaged = case.damaged
     seen, wall, near = damaged.seen, damaged.seen == OCCUPIED, _near(damaged)
-    water = from_water(seen)
     features, verdicts = [], []
     for each in candidates(open_walls(wall, seen), seen, _REACH):
-        parts = fill_cells(settled(each, seen, water), seen, wall)
+        parts = fill_cells(each, seen, wall)
         verdict = _verdict(parts[0], damaged, near) if parts else None
         if verdict is not None:
             features.append(each.features)
