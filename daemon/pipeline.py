@@ -67,7 +67,7 @@ class Pipeline:
     @property
     def whole(self) -> MapState:
         """The map as it is, with its evidence mixed over the poses: for files, since it takes seconds."""
-        return replace(self.state, mixture=self._mapper.mixture())
+        return replace(self.state, mixture=self._mapper.mixture(), levels=self._mapper.levels)
 
     def snapshots(self) -> list[Snapshot]:
         """Return the whole state as snapshots, for who begins to listen now; the next grid is a delta to this."""

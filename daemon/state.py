@@ -12,14 +12,15 @@ from numpy.typing import NDArray
 
 from fill.values import Filled, Mesh
 from mapping.ensemble import Mixture
-from mapping.values import Grid, Station
+from mapping.values import Grid, Level, Station
 
 
 @dataclass(frozen=True, slots=True)
 class MapState:
     """What is known at one moment: stations in the order of their scans, evidence, fills and surface.
 
-    ``mixture`` is the evidence mixed over the poses, None while the map still grows.
+    ``mixture`` is the evidence mixed over the poses, None while the map still grows; ``levels`` is what was seen at
+    other depths, where walls are elsewhere, likewise.
     """
 
     stations: tuple[Station, ...]
@@ -27,6 +28,7 @@ class MapState:
     filled: Filled
     mesh: Mesh
     mixture: Mixture | None = None
+    levels: tuple[Level, ...] = ()
 
 
 def grid_digest(grid: Grid) -> str:

@@ -9,7 +9,7 @@ from mapping.ensemble import Mixture
 from mapping.prior import Hint
 from mapping.sight import sight_of
 from mapping.stations import Stations
-from mapping.values import Grid, Scan, Station
+from mapping.values import Grid, Level, Scan, Station
 
 
 class Mapper:
@@ -57,3 +57,8 @@ class Mapper:
     def grid(self) -> Grid:
         """Evidence of the placed stations; no cells before the first."""
         return self._grid
+
+    @property
+    def levels(self) -> tuple[Level, ...]:
+        """What was seen at other depths, where the walls are not those of the map."""
+        return self._stations.levels()

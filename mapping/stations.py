@@ -26,7 +26,7 @@ from mapping.prior import Hint, Prior, agreed
 from mapping.sight import Sight
 from mapping.strides import Strides
 from mapping.swing import is_turned, swung
-from mapping.values import Grid, Pose, Station
+from mapping.values import Grid, Level, Pose, Station
 from mapping.verdict import judge, nowhere, origin
 
 FEW_POINTS = 12
@@ -53,6 +53,7 @@ class Stations:
         self._hints: list[Hint | None] = []
         self._tried: dict[tuple[int, int], tuple[int, int]] = {}
         self._map: tuple[int, ...] = ()
+        self._plans: list[list[int]] = []
         self._told: tuple[Station, ...] = ()
 
     @property
@@ -82,8 +83,16 @@ class Stations:
 
     def grid(self) -> Grid:
         """Draw the evidence of the stations of the map that show the same plan as the first."""
-        plans = self.plans()
-        return self._draw(plans[0] if plans else ())
+        self._plans = self.plans()
+        return self._draw(self._plans[0] if self._plans else ())
+
+    def levels(self) -> tuple[Level, ...]:
+        """Draw what other stations of the map saw of other plans, each by itself."""
+        scans = [[self._sights[k].scan for k in plan] for plan in self._plans[1:]]
+        return tuple(
+            Level(float(np.median([s.depth_m for s in told])), tuple(s.index for s in told), self._draw(plan))
+            for told, plan in zip(scans, self._plans[1:], strict=True)
+        )
 
     def mixture(self) -> Mixture:
         """Mix the evidence over the places that the stations may have; this takes long, for a map that is done."""

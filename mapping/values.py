@@ -131,3 +131,15 @@ class Grid:
     def probability(self) -> NDArray[np.float32]:
         """Occupancy ``(rows, cols)`` float32 in 0 to 1; 0.5 where nothing is known."""
         return (1.0 / (1.0 + np.exp(-self.log_odds))).astype(np.float32)
+
+
+@dataclass(frozen=True, slots=True)
+class Level:
+    """What scans of another depth than the map's saw of other walls: wells taper.
+
+    ``depth_m`` is their median depth, ``scans`` are their indices.
+    """
+
+    depth_m: float
+    scans: tuple[int, ...]
+    grid: Grid

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import platform
 from collections import Counter
+from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Final
@@ -20,7 +21,7 @@ from daemon.swing import compass_facts
 from drivers.records import Json
 from fill.values import Filled
 from mapping.ensemble import Mixture
-from mapping.values import FREE, OCCUPIED
+from mapping.values import FREE, OCCUPIED, Level
 from tools.files import make_folder, replace_file
 from tools.maps import state_shades, write_map
 from tools.plan import draw_plan
@@ -44,6 +45,7 @@ def write_outputs(
     """
     make_folder(folder)
     write_map(folder, "map", state.grid, state_shades(state.grid.state), yaw_rad)
+    write_levels(folder, state.levels)
     write_map(folder, "filled", state.grid, fill_shades(state.filled), yaw_rad)
     if state.mixture is not None:
         write_map(folder, "certainty", state.grid, mixed_shades(state.mixture), yaw_rad)
@@ -58,6 +60,14 @@ def write_outputs(
     facts = report(state, origin)
     replace_file(folder / "report.json", (json.dumps(facts, indent=2, sort_keys=True) + "\n").encode())
     return facts
+
+
+def write_levels(folder: Path, levels: Sequence[Level]) -> None:
+    """Write the evidence of other depths as ``map-level-2`` and so on; those of an earlier run go."""
+    for stale in folder.glob("map-level-*"):
+        stale.unlink()
+    for number, level in enumerate(levels, 2):
+        write_map(folder, f"map-level-{number}", level.grid, state_shades(level.grid.state))
 
 
 def fill_shades(filled: Filled) -> NDArray[np.uint8]:
@@ -86,6 +96,7 @@ def report(state: MapState, origin: Provenance) -> dict[str, Json]:
         "stations": dict(Counter[str](station.status for station in state.stations)),
         **_piece_facts(state),
         "compass": compass_facts(state.stations),
+        "levels": [{"depth_m": round(level.depth_m, 3), "stations": list(level.scans)} for level in state.levels],
         "grid": _grid_facts(state),
         "fills": _fill_facts(state.filled),
         "mesh": {"vertices": len(state.mesh.vertices), "triangles": len(state.mesh.triangles)},

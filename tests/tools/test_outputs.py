@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from daemon.state import MapState
 from fill.filler import filled_grid
 from fill.surface import extrude
 from fill.values import ASSUMED, FILLED, MEASURED, Hole, Mesh
-from mapping.values import FREE, OCCUPIED, UNKNOWN, Grid, Pose, Scan, Station, Status
+from mapping.values import FREE, OCCUPIED, UNKNOWN, Grid, Level, Pose, Scan, Station, Status
 from tools.maps import read_map
 from tools.outputs import write_outputs
 from tools.plan import draw_plan
@@ -71,6 +72,15 @@ def test_all_files_are_there_and_twice_the_same(state: MapState, origin: Provena
     assert {path.name for path in (tmp_path / "two").iterdir()} == FILES
     for name in FILES:
         assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes(), name
+
+
+def test_levels_of_a_well_have_maps_of_their_own(state: MapState, origin: Provenance, tmp_path: Path) -> None:
+    level = Level(2.5, (4, 5), state.grid)
+    facts = write_outputs(tmp_path / "out", replace(state, levels=(level,)), origin)
+    assert facts["levels"] == [{"depth_m": 2.5, "stations": [4, 5]}]
+    np.testing.assert_array_equal(read_map(tmp_path / "out" / "map-level-2.yaml").grid.state, state.grid.state)
+    write_outputs(tmp_path / "out", state, origin)
+    assert {path.name for path in (tmp_path / "out").iterdir()} == FILES
 
 
 def test_maps_keep_measured_and_filled_apart(state: MapState, origin: Provenance, tmp_path: Path) -> None:
