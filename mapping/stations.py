@@ -150,7 +150,7 @@ class Stations:
         seeds = [self._config.seed, sight.scan.index, base]
         prior = self._prior(i, base)
         match = along(self._charts.match(sight, base, prior, np.random.default_rng(seeds)), prior)
-        if is_turned(match.pose.heading_rad, prior) or match.fit < BAD_FIT:
+        if is_turned(match.pose.heading_rad, prior) or (match.fit < BAD_FIT and not prior.is_led):
             anyhow = replace(prior, cloud=None, disturbed=True)
             other = self._charts.match(sight, base, anyhow, np.random.default_rng([*seeds, 2]))
             match, prior = (other, anyhow) if other.height > match.height else (match, prior)
