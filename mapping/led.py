@@ -14,7 +14,7 @@ from mapping.values import Displacement, Pose
 
 LED_SD_M = 0.1
 """Least uncertainty of odometry from one scan to the next."""
-LED_MARGIN, LED_OVERLAP, LED_FIT = 3.0, 0.2, 0.2
+LED_MARGIN, LED_OVERLAP, LED_FIT = 3.0, 0.2, 0.1
 """Walls must only not speak against a place that is known without them."""
 SLIDES = 0.12
 """Information along the weakest axis (0.5 is the most) below which walls are not asked where along it a scan was made:
