@@ -10,7 +10,7 @@ from typing import Any, Final
 from config.schema import Config
 from drivers.decoders import Decoder, decoders_for, heed
 from drivers.quality import Tally
-from drivers.readings import Altitude, Depth, Heading, Odometry, HeadSettings, Ping, Reading, is_usable
+from drivers.readings import Altitude, Depth, Heading, HeadSettings, Odometry, Ping, Reading, is_usable
 from drivers.records import Chunk, ClockPair, Event, Record
 
 GAP_S: Final = 2.0
