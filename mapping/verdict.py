@@ -17,7 +17,7 @@ LEARNT = (1.55, 1.16, 0.39, -1.19, 1.32, -0.78)
 2,000 pairs of scans, a tenth of them out of reach of each other, and of half and of emulated scans."""
 MOST_MARGIN, MOST_FIT, LEAST_SD_M, MOST_HOLD = 30.0, 1.5, 0.02, 0.25
 """What lies beyond these makes a match no surer."""
-ACCEPT = 2.2
+ACCEPT = 1.9
 """Log-odds from which a scan counts as placed: no more than one in two hundred is then wrong ..."""
 WIDE = 2.6
 """... where it is of a piece of which the map knows nothing ..."""
