@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from config.schema import Feed, Site
 from drivers.polls import Poller
+from drivers.statements import Meaning, Statement
 from drivers.videoray_pro3 import Pro3, pro3_reader
 from drivers.videoray_pro4 import NAVIGATION_REQUEST, navigation_request, pro4_reader
 from tests.drivers.feedframes import PRO3_REQUEST, pro3_reply, pro4_crc_packet, pro4_navigation, pro4_packet, pro4_words
@@ -40,7 +41,8 @@ def test_replies_of_a_pro_3(shared_data: Path, index: int, heading_deg: int, cou
     frame = pro3_vectors(shared_data)[index]
     vehicle = Pro3(PRO3)
     name, statements = vehicle.read(frame)
-    assert (name, statements[0].value, vehicle.count) == ("reply", heading_deg, count)
+    assert (name, vehicle.count) == ("reply", count)
+    assert statements[0] == Statement(Meaning.MAGNETIC, heading_deg)
     readings, counters = run(PRO3, [(0, frame + PRO3_REQUEST * 2)])
     depth_m = 34.2 * (1017 - count) / (1017 - 313)
     assert [plain(each) for each in readings] == [("heading", heading_deg), ("depth", round(depth_m, 6))]
