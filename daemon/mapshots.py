@@ -125,6 +125,8 @@ def _hole(hole: Hole) -> dict[str, Json]:
         "curve": hole.curve,
         "why": hole.why,
         "ends_m": _points(hole.ends_m),
+        "parents": list(hole.parents),
+        "beyond_learnt": hole.beyond_learnt,
     }
 
 

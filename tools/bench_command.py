@@ -48,6 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--pictures", type=Path, metavar="DIR", help="holes: draw what was filled right and wrong")
     parser.add_argument("--paper-measure", action="store_true", help="holes: also the measure of the paper's table 1")
     parser.add_argument("--fit-prior", type=Path, metavar="FILE", help="holes: fit the prior of certainties instead")
+    parser.add_argument("--keep-decisions", action="store_true", help="holes: with --fit-prior, certainties alone")
     parser.add_argument("--json", action="store_true", help="print JSON lines")
 
 
@@ -111,7 +112,7 @@ def _holes(args: argparse.Namespace) -> Iterator[Row]:
         raise UsageError("--maps must be at least 1 and --seed at least 0")
     if args.fit_prior:
         seeds = range(args.seed, args.seed + args.seeds)
-        yield from holes_prior.fit_prior(args.data, seeds, args.maps, args.fit_prior)
+        yield from holes_prior.fit_prior(args.data, seeds, args.maps, args.fit_prior, args.keep_decisions)
         return
     yield from holes.measure(holes.HoleOptions(args.data, args.half, args.seed, args.maps, args.pictures))
     if args.paper_measure:

@@ -11,7 +11,10 @@ from fill.values import Filled
 from mapping.values import Station
 
 FILLS_HEADER = ("row", "col", "certainty", "hole")
-HOLES_HEADER = ("hole", "certainty", "gap_m", "cells", "curve", "x1_m", "y1_m", "x2_m", "y2_m", "why")
+HOLES_HEADER = (
+    "hole", "certainty", "gap_m", "cells", "curve", "x1_m", "y1_m", "x2_m", "y2_m", "why", "parents",
+    "beyond_learnt",
+)  # fmt: skip
 POSES_HEADER = (
     "station",
     "t_ns",
@@ -41,13 +44,14 @@ def fills_csv(filled: Filled) -> bytes:
 
 
 def holes_csv(filled: Filled) -> bytes:
-    """Every hole with the certainty that the whole of its fill is right, and where its two ends are."""
+    """Every hole: its certainty, its ends, the holes it goes on from, whether it is beyond what was learnt."""
     return _csv(
         HOLES_HEADER,
         (
             (
                 hole.index, f"{hole.hole_certainty:.4f}", f"{hole.gap_m:.3f}", len(hole.cells), hole.curve,
                 *(f"{value:.3f}" for value in hole.ends_m.ravel()), hole.why,
+                " ".join(str(parent) for parent in hole.parents), int(hole.beyond_learnt),
             )
             for hole in filled.holes
         ),

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from fill.candidates import FEATURES
 from fill.certainty import DESIGN, HIGHEST, LOWEST, falling, log_odds, whole_features
 from fill.logistic import Logistic, sigmoid
+from fill.prior import prior
 from tools.bench.holes_outcomes import Case, Filling, Tried, cases, filled, tried
 from tools.files import replace_file
 
@@ -57,12 +58,17 @@ class Tables:
     whole: Floats
 
 
-def fit_prior(data: Path, seeds: Sequence[int], pieces: int, out: Path) -> Iterator[Row]:
-    """Collect outcomes, yield figures of places left out, and write the tables fitted to all as a Python module."""
+def fit_prior(data: Path, seeds: Sequence[int], pieces: int, out: Path, keep: bool = False) -> Iterator[Row]:
+    """Collect outcomes, yield figures of places left out, and write the tables fitted to all as a Python module.
+
+    With ``keep`` the weights of candidates stay as they are, and only certainties are fitted, to what those close.
+    """
     found = cases(data, seeds, pieces)
-    holes = _hole_task(found, tried(found))
-    yield _figures("candidates", holes, left_out(holes))
-    weights = fitted(holes)
+    weights, facts = prior().hole.weights, "kept candidates"
+    if not keep:
+        holes = _hole_task(found, tried(found))
+        yield _figures("candidates", holes, left_out(holes))
+        weights, facts = fitted(holes), f"{len(holes.right)} candidates"
     fillings = filled(found, Logistic(weights, np.eye(len(weights))))
     fills = _fills(fillings)
     cells = _cell_task(found, fillings, fills)
@@ -80,7 +86,7 @@ def fit_prior(data: Path, seeds: Sequence[int], pieces: int, out: Path) -> Itera
     }
     low, high = np.quantile(cells.x, [_TAIL, 1.0 - _TAIL], axis=0)
     tables = Tables(weights, fitted(cells), low, high, spread, fitted(whole))
-    facts = f"{len(holes.right)} candidates and {len(cells.right)} filled cells"
+    facts += f" and {len(cells.right)} filled cells"
     replace_file(out, module(tables, facts, sorted({each.place for each in found if each.real})).encode())
 
 
