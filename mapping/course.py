@@ -17,6 +17,8 @@ from mapping.view import Field, field_of, from_map, to_map
 from mapping.way import ranges_of
 
 MOST_KNOTS = 64
+MOST_MARKS = 600
+"""Of a longer way every second beam is a mark, or every third: a way must not take longer than it took."""
 CLEAR = 0.3
 """Wall points of a rest with less trust are no marks."""
 FINE_M = 0.03
@@ -57,7 +59,8 @@ def course_of(here: Sight, there: Sight, way: Way, config: Map) -> Course:
     seconds = max(float(since_s[-1]), 4.0 * KNOT_S)
     knots = min(math.ceil(seconds / KNOT_S) + 1, MOST_KNOTS)
     range_m, trust = ranges_of(way, config)
-    heard = np.isfinite(range_m)
+    heard = np.flatnonzero(np.isfinite(range_m))
+    heard = heard[:: max(1, math.ceil(len(heard) / MOST_MARKS))]
     at = np.minimum(since_s / seconds * (knots - 1), knots - 1 - 1e-9)[heard]
     turned = np.abs(np.diff(np.unwrap(way.direction_rad), prepend=way.direction_rad[:1])).cumsum()[heard]
     direction, z = way.direction_rad[heard], range_m[heard]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from config.schema import Map
-from mapping.course import agreement, course_of
+from mapping.course import MOST_MARKS, agreement, course_of
 from mapping.echoes import pick
 from mapping.path import HERE, THERE, improve, inertia
 from mapping.prior import Cloud
@@ -106,6 +106,20 @@ def test_a_path_that_is_a_little_wrong_settles_where_the_vehicle_went(keyhole: t
     assert agreement(settled, course) > agreement(path, course) + 5.0
     assert np.linalg.eigvalsh(information[3:, 3:]).min() > 0.0
     assert np.all(settled[0] == 0.0)
+
+
+def test_a_long_way_has_no_more_marks_than_can_be_settled(keyhole: tuple[Sight, Sight]) -> None:
+    here, there = keyhole
+    way = there.scan.way
+    assert way is not None
+    n = 4 * len(way.t_ns)
+    long = Way(
+        np.arange(n) * 20_000_000, np.resize(way.direction_rad, n), np.resize(way.echoes, (n, way.echoes.shape[1])),
+        way.bin_m, way.step_rad,
+    )  # fmt: skip
+    short, course = course_of(here, there, way, Map()), course_of(here, there, long, Map())
+    assert (short.marks.group > HERE).sum() < (course.marks.group > HERE).sum() <= MOST_MARKS
+    assert np.isfinite(agreement(np.zeros((course.knots + 2, 3)), course))
 
 
 def test_what_smooth_walls_seem_to_tell_along_them_is_taken_off() -> None:
