@@ -16,6 +16,7 @@ from config.schema import Map
 from tools.bench import (
     acquisition,
     beams,
+    fill_times,
     holes,
     holes_maps,
     holes_paper,
@@ -30,7 +31,7 @@ from tools.emulator.vehicle import PILOTS
 
 Row = dict[str, str | int | float]
 
-_BENCHES: Final = ("tank", "truth", "stations", "acquisition", "holes")
+_BENCHES: Final = ("tank", "truth", "stations", "acquisition", "fill", "holes")
 _ON_DATA: Final = ("tank", "stations", "holes")
 
 
@@ -79,6 +80,7 @@ def _measure(name: str, args: argparse.Namespace) -> Iterator[Row]:
         "truth": _truth,
         "stations": _stations,
         "acquisition": _acquisition,
+        "fill": _fill,
         "holes": _holes,
     }
     return measures[name](args)
@@ -104,6 +106,11 @@ def _stations(args: argparse.Namespace) -> Iterator[Row]:
 
 def _acquisition(args: argparse.Namespace) -> Iterator[Row]:
     for figure in acquisition.measure(acquisition.QUICK if args.quick else acquisition.FULL):
+        yield figure.row()
+
+
+def _fill(args: argparse.Namespace) -> Iterator[Row]:
+    for figure in fill_times.measure(args.seed):
         yield figure.row()
 
 

@@ -1,0 +1,118 @@
+"""What filling costs, in processor time of one core: a pass after a scan, a pass from scratch, and learning a hole.
+
+Learning is the drill (``fill.drill``): every stretch of every wall is a hole that is fitted from both sides and judged,
+which without its matrices would be one polynomial fit a hole.  So its cost is told by the hole, beside one call of
+``numpy.polyfit`` on as many points, cubic, for x and y together.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from config.schema import Fill
+from fill.drill import SIZES, drill
+from fill.filler import Filler
+from mapping.values import FREE, OCCUPIED, UNKNOWN, Grid
+from tools.bench.figure import Figure, at_most
+
+_SHAPE: Final = (200, 600)
+_WALLS: Final = 90
+_SEGMENT: Final = 66  # cells
+_PASSES: Final = 5
+_SCANNED: Final = 10  # cells about a place that a scan tells of anew
+_SIDE: Final = 8  # cells on either side of a hole that the drill fits
+_REPEATS: Final = 9
+_FITS: Final = 200
+
+
+def measure(seed: int) -> Iterator[Figure]:
+    """Yield the figures."""
+    random = np.random.default_rng(seed)
+    finished = _rooms(random)
+    state = _torn(finished, random)
+    filler = Filler(Fill())
+    first = _grid(state)
+    yield Figure("fill from scratch, 600 x 200, 90 walls", 1e3 * _seconds(lambda: filler.update(first)), "ms")
+    passes = []
+    for _ in range(_PASSES):
+        state = _scanned(state, finished, random)
+        grid = _grid(state)
+        passes.append(1e3 * _seconds(partial(filler.update, grid)))
+    yield Figure("fill after a scan, median (aim: 15)", float(np.median(passes)), "ms")
+    told, anew = filler.update(_grid(state)), Filler(Fill()).update(_grid(state))
+    same = told.certainty.tobytes() == anew.certainty.tobytes() and told.hole.tobytes() == anew.hole.tobytes()
+    yield Figure("... the same to the byte as from scratch", float(same), "", "yes", bool(same))
+    learning, fit = _learning(random)
+    yield Figure("learning, by the hole", 1e6 * learning, "us")
+    yield at_most("... in fits by numpy.polyfit", learning / fit, 1 / 70, "fits")
+
+
+def _learning(random: np.random.Generator) -> tuple[float, float]:
+    """Seconds of the drill by the hole, and of one polynomial fit; the best of several turns of each."""
+    lines = [_line(random) for _ in range(_WALLS)]
+    holes = sum(max(0, _SEGMENT - size - 2 * _SIDE + 1) for size in SIZES) * _WALLS
+    place, points = np.arange(2.0 * _SIDE), random.normal(size=(2 * _SIDE, 2))
+    drill(lines)
+    learnt = min(_seconds(lambda: drill(lines)) for _ in range(_REPEATS)) / holes
+    fitted = min(_seconds(lambda: [np.polyfit(place, points, 3) for _ in range(_FITS)]) for _ in range(_REPEATS))
+    return learnt, fitted / _FITS
+
+
+def _line(random: np.random.Generator) -> NDArray[np.float64]:
+    return np.stack([np.arange(float(_SEGMENT)), np.rint(np.cumsum(random.normal(0.0, 0.3, _SEGMENT)))], axis=1)
+
+
+def _rooms(random: np.random.Generator) -> NDArray[np.uint8]:
+    """Rooms side by side, their walls two cells thick."""
+    water = np.zeros(_SHAPE, bool)
+    col = 8
+    while col < _SHAPE[1] - 60:
+        wide, row = int(random.integers(30, 60)), 8
+        while row < _SHAPE[0] - 44:
+            high = int(random.integers(28, 60))
+            water[row : min(row + high, _SHAPE[0] - 8), col : col + wide] = True
+            row += high + 6
+        col += wide + 6
+    state = np.full(_SHAPE, UNKNOWN, np.uint8)
+    state[ndimage.binary_dilation(water, np.ones((3, 3), np.int8), iterations=2)] = OCCUPIED
+    state[water] = FREE
+    return state
+
+
+def _torn(finished: NDArray[np.uint8], random: np.random.Generator) -> NDArray[np.uint8]:
+    """Forget discs about walls until so many walls are left."""
+    state = finished.copy()
+    walls = np.argwhere(state == OCCUPIED)
+    while int(ndimage.label(state == OCCUPIED, np.ones((3, 3)))[1]) < _WALLS:
+        state[_disc(walls[random.integers(len(walls))], random.uniform(2.0, 6.0))] = UNKNOWN
+    return state
+
+
+def _scanned(state: NDArray[np.uint8], finished: NDArray[np.uint8], random: np.random.Generator) -> NDArray[np.uint8]:
+    """Return the state after a scan that tells about one of the places that were forgotten."""
+    lost = np.argwhere((state == UNKNOWN) & (finished == OCCUPIED))
+    if not len(lost):
+        return state
+    return np.where(_disc(lost[random.integers(len(lost))], _SCANNED), finished, state).astype(np.uint8)
+
+
+def _disc(middle: NDArray[np.int64], radius: float) -> NDArray[np.bool_]:
+    rows, cols = np.ogrid[: _SHAPE[0], : _SHAPE[1]]
+    return np.asarray((rows - middle[0]) ** 2 + (cols - middle[1]) ** 2 <= radius**2, np.bool_)
+
+
+def _grid(state: NDArray[np.uint8]) -> Grid:
+    return Grid(0.05, 0.0, 0.0, np.zeros(state.shape, np.float32), state)
+
+
+def _seconds(work: Callable[[], object]) -> float:
+    start = time.process_time()
+    work()
+    return time.process_time() - start
