@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import islice
 from typing import Protocol
 
 import numpy as np
@@ -32,6 +33,8 @@ SURE_M = 0.3
 SAME_LEVEL_M = 0.2
 """Where none is of a scan's level, those are that are within this of the nearest level."""
 LEAST_PARTICLES = 200
+HOPELESS = 1.0
+"""A match of a smaller margin is not believed, and nobody else need be heard."""
 
 Floats = NDArray[np.float64]
 
@@ -48,10 +51,10 @@ class Charts:
         reference = self.reference(held, prior, sight)
         if rise_m(sight.scan, self._pieces.sight(held[0]).scan) <= LEVEL_M:
             match = register(sight.view, reference, prior, self._config.particles * prior.effort, rng)
-            if held == [base]:
+            if held == [base] or match.margin < HOPELESS:
                 return match
             alone = Likelihood(sight.view, self.reference([base], prior, sight), prior)
-            best, _ = search(alone, prior, self._config.particles * prior.effort, rng, np.zeros((0, 3)))
+            best, _ = search(alone, prior, self._config.particles // 2 * prior.effort, rng, np.zeros((0, 3)))
             margin = doubted(match, best, Likelihood(sight.view, reference, prior), alone)
             return replace(match, margin=min(match.margin, margin))
         rise = min(rise_m(sight.scan, self._pieces.sight(k).scan) for k in held)
@@ -68,8 +71,8 @@ class Charts:
         rise = {k: rise_m(sight.scan, self._pieces.sight(k).scan) for k in solution.stations}
         level = [k for k in solution.stations if rise[k] <= max(LEVEL_M, min(rise.values()) + SAME_LEVEL_M)]
         near = sorted(level, key=lambda k: (_away_m(self._pieces.pose(k), xy_m), k))
-        sure = [k for k in near if k == base or sd_m(solution.between(base, k)) <= SURE_M]
-        return (sure or near)[:NEIGHBOURS]
+        sure = (k for k in near if k == base or sd_m(solution.between(base, k)) <= SURE_M)
+        return list(islice(sure, NEIGHBOURS)) or near[:NEIGHBOURS]
 
     def reference(self, held: Sequence[int], prior: Prior, sight: Sight) -> View:
         """Make what stations saw, as far as a scan may have seen it, into one view."""

@@ -16,7 +16,7 @@ import numpy as np
 from config.schema import Map
 from mapping.chart import Charts
 from mapping.ensemble import DRAWS, Mixture, draw, mix
-from mapping.graph import put_at, seen_from
+from mapping.graph import seen_from
 from mapping.grid import Canvas
 from mapping.hypotheses import ASKED, lies
 from mapping.led import along, led
@@ -26,7 +26,8 @@ from mapping.prior import Hint, Prior, agreed
 from mapping.sight import Sight
 from mapping.strides import Strides
 from mapping.swing import is_turned, swung
-from mapping.values import Grid, Level, Pose, Station
+from mapping.telling import Guess, largest, told
+from mapping.values import Grid, Level, Station
 from mapping.verdict import judge, nowhere, origin
 
 FEW_POINTS = 12
@@ -52,6 +53,7 @@ class Stations:
         self._sights: list[Sight] = []
         self._hints: list[Hint | None] = []
         self._tried: dict[tuple[int, int], tuple[int, int]] = {}
+        self._guesses: dict[int, Guess] = {}
         self._map: tuple[int, ...] = ()
         self._plans: list[list[int]] = []
         self._told: tuple[Station, ...] = ()
@@ -133,6 +135,8 @@ class Stations:
                 return station
         self._tried |= {(base, i): (min(len(self._pieces.of(base)), ASKED), 1) for base in bases}
         first = judged[0] if judged else origin(sight.scan, config)
+        if bases:
+            self._guesses[i] = Guess(bases[0], seen_from(self._pieces.pose(bases[0]), first.pose))
         self._pieces.begin(i, sight, first.pose)
         return first
 
@@ -241,33 +245,5 @@ class Stations:
 
     def _tell(self) -> None:
         """Tell all stations: the largest piece is the map, and the first of its stations the origin."""
-        held = set(self._map)
-        self._map = max(self._pieces.all, key=lambda p: (len(p), len(held & set(p)), -p[0]), default=())
-        told = dict(enumerate(self._judged))
-        for piece in self._pieces.all:
-            told.update(self._of_piece(piece))
-        self._told = tuple(told[k] for k in range(len(self._judged)))
-
-    def _of_piece(self, piece: tuple[int, ...]) -> dict[int, Station]:
-        """Tell the stations of a piece; one that is not the map lies, as a guess, where its first may have been."""
-        first, solution = self._pieces.pose(piece[0]), self._pieces.solution(piece[0])
-        number = 0 if piece == self._map else self._sights[piece[0]].scan.index + 1
-        if number and len(piece) == 1:
-            alone = self._judged[piece[0]]
-            return {
-                piece[0]: replace(alone, status="doubtful" if alone.status == "placed" else alone.status, piece=number)
-            }
-        moved = Pose(0.0, 0.0, first.heading_rad)
-        told = {}
-        for k in piece:
-            station, pose = self._judged[k], put_at(moved, seen_from(first, self._pieces.pose(k)))
-            station = replace(station, pose=pose, covariance=solution.stated(k), piece=number)
-            if k == piece[0]:
-                station = replace(station, covariance=origin(station.scan, self._config).covariance)
-            if number:
-                why = f"fits its piece of {len(piece)} scans, which nothing ties to the map yet; go back to the map"
-                station = replace(station, status="unplaced", why=why)
-            else:
-                station = replace(station, status="placed")
-            told[k] = station
-        return told
+        self._map = largest(self._pieces, self._map)
+        self._told = told(self._pieces, self._judged, self._guesses, self._map, self._config)

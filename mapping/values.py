@@ -97,10 +97,10 @@ Status = Literal["placed", "doubtful", "unplaced", "dropped"]
 class Station:
     """A scan with its place in the map, or with the reason why it has none.
 
-    ``covariance`` is ``(3, 3)`` float64 over x_m, y_m, heading_rad.  ``piece`` numbers the connected parts of the
-    map; piece 0 holds the first station, and the poses of another piece are a guess as a whole.  ``margin`` is the
-    log-posterior of the pose above the best one elsewhere (nan for the first station).  ``why`` is one sentence for
-    the pilot.  Only ``placed`` stations are in the evidence.
+    ``covariance`` is ``(3, 3)`` float64 over x_m, y_m, heading_rad, about the first station of the piece.  ``piece``
+    numbers what is tied together; piece 0, the largest, is the map, and where another lies is a guess as a whole.
+    ``margin`` is the log-posterior of the pose above the best one elsewhere (nan for the first station).  ``why`` is
+    one sentence for the pilot.  Only ``placed`` stations are in the evidence.
     """
 
     scan: Scan

@@ -27,6 +27,7 @@ POSES_HEADER = (
     "cov_xy_m2",
     "sd_heading_deg",
     "status",
+    "piece",
 )
 
 
@@ -78,6 +79,7 @@ def _pose_row(station: Station) -> tuple[object, ...]:
         f"{float(covariance[0, 1]):.6f}",
         f"{math.degrees(sds[2]):.3f}",
         station.status,
+        station.piece,
     )
 
 

@@ -147,3 +147,20 @@ def test_the_largest_piece_is_the_map_and_begins_at_its_first_station(keyhole: l
     first = stations.all[1].pose
     assert (first.x_m, first.y_m) == (0.0, 0.0)
     assert stations.grid().state.any()
+
+
+def test_a_piece_that_floats_is_told_as_such_and_lies_where_its_first_scan_may_be(keyhole: list[Sight]) -> None:
+    foreign = sights_of(RECTANGLE, [Stay(3.0, 0.0, 1.0, 330), Stay(2.0, 0.6, 1.5, 330)])
+    stations = Stations(Map())
+    for k, sight in enumerate([*keyhole[:3], *foreign]):
+        stations.add(replace(sight, scan=replace(sight.scan, index=k)), None)
+    told = stations.all
+    assert [s.piece for s in told] == [0, 0, 0, 4, 4]
+    assert [s.status for s in told[3:]] == ["unplaced", "unplaced"]
+    assert "piece of 2" in told[4].why
+    apart = math.hypot(told[4].pose.x_m - told[3].pose.x_m, told[4].pose.y_m - told[3].pose.y_m)
+    assert apart == pytest.approx(math.hypot(1.0, 0.6), abs=0.1)
+    assert math.hypot(told[3].pose.x_m - told[2].pose.x_m, told[3].pose.y_m - told[2].pose.y_m) < 4.0
+    without = stations.grid().log_odds.tobytes()
+    assert stations.drop(4)
+    assert stations.grid().log_odds.tobytes() == without
