@@ -19,8 +19,8 @@ from mapping.values import Returns, Scan
 OCCUPIED_LOG_ODDS = 3.0
 """Of a wall whose range is known to about a cell; less where the range is less sure."""
 FREE_LOG_ODDS = -0.9
-THICK = 0.4
-"""A wall is at least this thick, in cells, behind its face."""
+THICK = 0.5
+"""A wall is drawn at least this thick, in cells, about its face: to one side only, rooms would come out too large."""
 HINT_LOG_ODDS = 0.5
 """Occupied by no more than this is a hint: hints of several scans are not added up, for they err alike."""
 VAGUE_LOG_ODDS = 0.45
@@ -96,7 +96,7 @@ def polar_evidence(scan: Scan, returns: Returns, beam_rad: float, cell_m: float)
     """Compute what a scan says about each bearing and range, relative to its own heading.
 
     The wall's face lies at the return's range with its standard deviation.  A cell is occupied where the face is in it
-    or just before it, free where the face is behind it, and unknown where the face is before it by more than that.
+    or next to it, free where the face is behind it, and unknown where the face is before it by more than that.
     """
     step_m = cell_m / 2.5
     fan = spread(scan.bearing_rad, returns, scan.step_rad, beam_rad)
@@ -121,9 +121,9 @@ def polar_evidence(scan: Scan, returns: Returns, beam_rad: float, cell_m: float)
 
 def of_face(behind_m: NDArray[np.float64], sd_m: NDArray[np.float64], cell_m: float) -> NDArray[np.float64]:
     """Log-odds ``(n,)`` of cells whose centres lie ``behind_m`` behind faces of walls as they were measured."""
-    half, thick = 0.5 * cell_m, THICK * cell_m
+    half = 0.5 * (1.0 + THICK) * cell_m
     before = 0.5 * (1.0 - erf((behind_m + half) / (sd_m * math.sqrt(2.0))))
-    past = 0.5 * (1.0 + erf((behind_m - half - thick) / (sd_m * math.sqrt(2.0))))
+    past = 0.5 * (1.0 + erf((behind_m - half) / (sd_m * math.sqrt(2.0))))
     within = 1.0 - before - past
     p = within * _odds(OCCUPIED_LOG_ODDS) + before * _odds(FREE_LOG_ODDS) + past * 0.5
     log_odds = np.log(p / (1.0 - p))
