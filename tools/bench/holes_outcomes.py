@@ -96,7 +96,7 @@ def _tried(case: Case) -> Tried:
     features, verdicts = [], []
     for each in candidates(open_walls(wall, seen), seen, _REACH):
         parts = fill_cells(each, seen, wall)
-        verdict = _verdict(parts[0], damaged, near) if parts else None
+        verdict = _verdict(np.concatenate(parts), damaged, near) if parts else None
         if verdict is not None:
             features.append(each.features)
             verdicts.append(verdict)
