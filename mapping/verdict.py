@@ -27,6 +27,9 @@ GAP = 4.5
 """... where neither the scan before nor the one after is placed: pillars repeat, and reach is no bound then ..."""
 LOST = 7.0
 """... and where the way was followed, and lost: along smooth walls a scan fits best where the vehicle did not move."""
+STILL, STILL_M = 5.0, 0.6
+"""... and where a scan fits best so near to where the one before was made: what travels with the vehicle, ghosts and
+the ends of what it sees, fits there in any tunnel."""
 LEAST_MARGIN = 4.0
 """However well a scan fits, what fits so nearly as well elsewhere is not placed."""
 DOUBT_MARGIN = 3.0
@@ -46,7 +49,7 @@ def judge(scan: Scan, match: Match, piece: int, prior: Prior, *, chained: bool) 
     ``chained`` tells that the scan before or the one after is of the piece.
     """
     sd_m = _sd_m(match)
-    fits = match.margin >= LEAST_MARGIN and log_odds(match) >= _needed(prior, piece, chained=chained)
+    fits = match.margin >= LEAST_MARGIN and log_odds(match) >= _needed(match, prior, piece, chained=chained)
     sure = is_led(match) if prior.is_led else fits
     status: Status = "placed"
     if not sure or sd_m > ACCEPT_SD_M or match.astray > ASTRAY:
@@ -89,13 +92,16 @@ def nowhere(scan: Scan, config: Map, why: str) -> Station:
     return Station(scan, Pose(0.0, 0.0, scan.heading_rad), covariance, "unplaced", scan.index + 1, 0.0, why)
 
 
-def _needed(prior: Prior, piece: int, *, chained: bool) -> float:
+def _needed(match: Match, prior: Prior, piece: int, *, chained: bool) -> float:
     """Log-odds that a match needs: by whether the way was seen, or followed and lost."""
     if prior.cloud is not None:
         return SEEN if prior.cloud.sd_m <= SEEN_SD_M else LOST
-    if chained:
-        return WIDE if piece > 0 else ACCEPT
-    return LOST if piece > 0 else GAP
+    if not chained:
+        return LOST if piece > 0 else GAP
+    moved_m = math.hypot(match.pose.x_m - prior.x_m, match.pose.y_m - prior.y_m)
+    if moved_m < STILL_M and not prior.gaussian:
+        return STILL
+    return WIDE if piece > 0 else ACCEPT
 
 
 def _why(status: Status, match: Match, sd_m: float) -> str:

@@ -114,6 +114,14 @@ def test_a_match_is_likelier_right_with_more_margin_and_less_width() -> None:
     assert log_odds(replace(match, overlap=0.1, fit=0.0)) < log_odds(match)
 
 
+def test_a_scan_that_fits_best_where_the_one_before_was_made_needs_more() -> None:
+    scan = seen(KEYHOLE, 0.3, 0.2, 0.1, seed=2)
+    match = replace(matched(scan, seen(KEYHOLE, 0.0, 0.0, 0.0)), margin=8.0, overlap=0.7, fit=0.6)
+    here, there = (Prior(x_m, 0.0, 3.0, 0.1, 0.1) for x_m in (0.0, -1.5))
+    assert judge(scan.scan, match, 0, here, chained=True).status == "doubtful"
+    assert judge(scan.scan, match, 0, there, chained=True).status == "placed"
+
+
 def test_a_scan_of_few_points_says_little() -> None:
     whole = seen(KEYHOLE, 0.3, 0.2, 0.0, seed=2)
     heard = np.arange(200) < 60
