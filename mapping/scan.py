@@ -291,8 +291,7 @@ class ScanBuilder:
 
     def _trim(self) -> None:
         """Forget what lies more than two turns or two sweeps back."""
-        last = self._beams[-1]
-        far = KEEP_TURNS * TURN
+        last, far = self._beams[-1], KEEP_TURNS * TURN
         kept = [i for i, b in enumerate(self._beams) if b.leg >= last.leg - 1 and abs(b.turn_rad - last.turn_rad) < far]
         first = max(kept[0], len(self._beams) - MAX_PINGS)
         if first < 64:
