@@ -22,6 +22,7 @@ from mapping.values import OCCUPIED, UNKNOWN
 
 THRESHOLD: Final = 0.25
 """A fill less likely right than this is not drawn: the end stays open."""
+_MOST_ENDS: Final = 1500
 CAP: Final = 6  # cells before an end that tell whether it was seen to be the end
 _SMALL: Final = 12.0  # cells: gaps that are closed before any larger one is looked at
 
@@ -73,7 +74,15 @@ def open_walls(wall: NDArray[np.bool_], state: NDArray[np.uint8], memory: Memory
 
     capped_there = (memory.recall(("capped", content(end)), partial(_capped, end, state)) for end in walls.ends)
     ends = (end for end, shut in zip(walls.ends, capped_there, strict=True) if not shut)
-    return dataclasses.replace(walls, ends=tuple(ends))
+    return dataclasses.replace(walls, ends=_longest(tuple(ends)))
+
+
+def _longest(ends: tuple[End, ...]) -> tuple[End, ...]:
+    """Keep the ends of the longest walls where there are more than any site has: such a grid is noise for the most."""
+    if len(ends) <= _MOST_ENDS:
+        return ends
+    kept = sorted(range(len(ends)), key=lambda index: (-ends[index].length, index))[:_MOST_ENDS]
+    return tuple(ends[index] for index in sorted(kept))
 
 
 def _capped(end: End, state: NDArray[np.uint8]) -> tuple[Box, bool]:

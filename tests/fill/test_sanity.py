@@ -1,0 +1,55 @@
+"""Grids that no site gives: nothing, nothing but wall, one wall alone, noise, and all of these large."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from config.schema import Fill
+from fill.closing import open_walls
+from fill.filler import Filler
+from fill.values import Filled
+from mapping.values import FREE, OCCUPIED, UNKNOWN, Grid
+
+_LARGE = (2000, 2000)
+
+
+def fill(state: NDArray[np.uint8]) -> Filled:
+    return Filler(Fill()).update(Grid(0.05, 0.0, 0.0, np.zeros(state.shape, np.float32), state))
+
+
+def noise(side: int) -> NDArray[np.uint8]:
+    values = np.repeat(np.array([UNKNOWN, FREE, OCCUPIED], np.uint8), (6, 3, 1))
+    return np.random.default_rng(0).choice(values, (side, side))
+
+
+@pytest.mark.parametrize("value", [UNKNOWN, FREE, OCCUPIED])
+def test_a_large_grid_of_one_kind_has_no_hole(value: int) -> None:
+    filled = fill(np.full(_LARGE, value, np.uint8))
+    assert filled.holes == ()
+    assert len(filled.open_ends_m) == 0
+
+
+def test_one_wall_in_a_large_grid_is_filled_where_it_is_broken() -> None:
+    state = np.full(_LARGE, UNKNOWN, np.uint8)
+    state[1000:1003, 100:1900] = OCCUPIED
+    state[1003:1400, 100:1900] = FREE
+    state[1000:1003, 900:910] = UNKNOWN
+    (hole,) = fill(state).holes
+    assert set(hole.cells[:, 1].tolist()) == set(range(900, 910))
+
+
+def test_of_noise_only_the_longest_walls_keep_their_ends() -> None:
+    state = noise(400)
+    ends = open_walls(state == OCCUPIED, state).ends
+    assert len(ends) == 1500
+    fewer = open_walls(state[:200, :200] == OCCUPIED, state[:200, :200]).ends
+    assert 0 < len(fewer) < 1500
+
+
+@pytest.mark.slow
+def test_noise_is_never_filled_over_what_was_seen() -> None:
+    state = noise(120)
+    filled = fill(state)
+    assert np.all(state[filled.hole >= 0] == UNKNOWN)
