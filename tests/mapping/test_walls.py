@@ -172,7 +172,8 @@ def leaning_echoes(lean: float, range_m: float = 2.0) -> np.ndarray:
     power, _ = np.histogram(met_m, np.arange(401) * BIN_M, weights=lobe * beam)
     level = 150.0 + 31.875 * np.log10(np.maximum(power / power.max(), 1e-6))
     speckle = np.random.default_rng(4).normal(0.0, 12.0, (200, 400))
-    return np.maximum(np.maximum(level, 0.0) + speckle, 15.0)
+    echoes: np.ndarray = np.maximum(np.maximum(level, 0.0) + speckle, 15.0)
+    return echoes
 
 
 def centres(echoes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
