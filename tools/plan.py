@@ -9,19 +9,23 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image, PngImagePlugin
 
 from fill.values import Filled
 from mapping.values import Station
 from tools import plan_canvas as canvas
 from tools.plan_canvas import Frame, frame_of, raster
-from tools.plan_marks import STATION, Pen, draw_certainties, draw_north, draw_scale_bar, draw_stations
+from tools.plan_marks import STATION, Pen, draw_certainties, draw_ellipses, draw_north, draw_scale_bar, draw_stations
+from tools.plan_pieces import PIECE, draw_dashes, draw_pieces, pieces_of, room_for
 from tools.provenance import Provenance
 
 _PANEL: Final = 270  # width of the legend, px
 _TITLE: Final = 62
 _EDGE: Final = 12
-_LOWEST: Final = 470  # the legend needs this height
+_LOWEST: Final = 470  # the legend needs this height, and more where it names many stations
+_NAMES_AT: Final = 350
+_NAMES_STEP: Final = 18
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,21 +36,40 @@ class Plan:
     world: str
 
 
+@dataclass(frozen=True, slots=True)
+class _Marked:
+    """What the legend tells of stations: those outside floating pieces, whether there are such, and who is named."""
+
+    alone: Sequence[Station]
+    has_pieces: bool
+    names: Sequence[str]
+
+
 def draw_plan(filled: Filled, stations: Sequence[Station], origin: Provenance) -> Plan:
     """Draw the plan, north up, with title, legend, scale bar and stations."""
-    shown = [each for each in stations if each.status in ("placed", "doubtful")]
-    places = np.array([(each.pose.x_m, each.pose.y_m) for each in shown]).reshape(-1, 2)
-    frame = frame_of(filled, places)
-    width, height = frame.width + _PANEL + 3 * _EDGE, max(frame.height, _LOWEST) + _TITLE + _EDGE
+    pieces = pieces_of(stations)
+    alone = [each for each in stations if each.piece not in pieces or each.status == "dropped"]
+    frame = frame_of(filled, np.concatenate([_places(alone), room_for(pieces, filled.grid.cell_m)]))
+    names = _names(alone, pieces)
+    lowest = max(frame.height, _LOWEST, _NAMES_AT + _NAMES_STEP * len(names))
+    width, height = frame.width + _PANEL + 3 * _EDGE, lowest + _TITLE + _EDGE
     image = Image.new("RGB", (width * frame.fine, height * frame.fine), canvas.PAPER)
-    image.paste(Image.fromarray(raster(filled, frame)), (_EDGE * frame.fine, _TITLE * frame.fine))
+    picture = Image.fromarray(raster(filled, frame))
+    draw_ellipses(Pen(picture, frame.fine, 0, 0), frame, alone)
+    image.paste(picture, (_EDGE * frame.fine, _TITLE * frame.fine))
     over = Pen(image, frame.fine, _EDGE, _TITLE)
     draw_certainties(over, frame, filled)
-    draw_stations(over, frame, stations)
+    draw_pieces(over, frame, pieces)
+    draw_stations(over, frame, alone)
     _title(Pen(image, frame.fine, _EDGE, 0), origin, width - 2 * _EDGE)
-    _legend(Pen(image, frame.fine, frame.width + 2 * _EDGE, _TITLE), frame, filled, stations)
+    _legend(Pen(image, frame.fine, frame.width + 2 * _EDGE, _TITLE), frame, filled, _Marked(alone, bool(pieces), names))
     final = image.resize((width, height), Image.Resampling.BOX) if frame.fine > 1 else image
     return Plan(_png(final, origin), _world(frame))
+
+
+def _places(alone: Sequence[Station]) -> NDArray[np.float64]:
+    shown = [each.pose for each in alone if each.status in ("placed", "doubtful")]
+    return np.array([(pose.x_m, pose.y_m) for pose in shown]).reshape(-1, 2)
 
 
 def _title(pen: Pen, origin: Provenance, room: float) -> None:
@@ -57,7 +80,7 @@ def _title(pen: Pen, origin: Provenance, room: float) -> None:
     pen.text(0, 38, line, 12)
 
 
-def _legend(pen: Pen, frame: Frame, filled: Filled, stations: Sequence[Station]) -> None:
+def _legend(pen: Pen, frame: Frame, filled: Filled, marked: _Marked) -> None:
     draw_north(pen, _PANEL - 24, 52)
     draw_scale_bar(pen, frame, 8, 26, _PANEL - 90)
     y = 84.0
@@ -71,9 +94,11 @@ def _legend(pen: Pen, frame: Frame, filled: Filled, stations: Sequence[Station])
         y += 27
     pen.text(0, y + 4, "wall, filled in; certainty:", 14)
     y = _ramp(pen, y + 26)
-    holes = len(filled.holes)
-    pen.text(0, y, f"{holes} hole{'' if holes == 1 else 's'} filled, {len(filled.open_ends_m)} ends left open", 13)
-    _station_legend(pen, y + 26, stations)
+    holes, ends = len(filled.holes), len(filled.open_ends_m)
+    pen.text(
+        0, y, f"{holes} hole{'' if holes == 1 else 's'} filled, {ends} end{'' if ends == 1 else 's'} left open", 13
+    )
+    _mark_legend(pen, y + 26, marked)
 
 
 def _swatch(pen: Pen, x: float, y: float, kind: str) -> None:
@@ -101,22 +126,34 @@ def _ramp(pen: Pen, y: float) -> float:
     return y + 46
 
 
-def _station_legend(pen: Pen, y: float, stations: Sequence[Station]) -> None:
-    if not stations:
-        return
-    pen.disc(10, y + 8, 4.5, STATION, STATION)
-    pen.line([(10, y + 8), (10, y - 6)], STATION, 2.2)
-    pen.text(28, y + 8, "station, heading, 95 % ellipse", 13, anchor="lm")
-    y += 24
-    if any(each.status == "doubtful" for each in stations):
+def _mark_legend(pen: Pen, y: float, marked: _Marked) -> None:
+    if marked.alone:
+        pen.disc(10, y + 8, 4.5, STATION, STATION)
+        pen.line([(10, y + 8), (10, y - 6)], STATION, 2.2)
+        pen.text(28, y + 8, "station, heading, 95 % ellipse", 13, anchor="lm")
+        y += 24
+    if any(each.status == "doubtful" for each in marked.alone):
         pen.disc(10, y + 8, 4.5, canvas.PAPER, STATION)
         pen.text(28, y + 8, "doubtful: not in the evidence", 13, anchor="lm")
         y += 24
-    for status in ("unplaced", "dropped"):
-        numbers = ", ".join(str(each.scan.index) for each in stations if each.status == status)
-        for line in textwrap.wrap(f"{status}: {numbers}", 38) if numbers else ():
-            pen.text(0, y, line, 13)
-            y += 18
+    if marked.has_pieces:
+        draw_dashes(pen, [(0, y + 1), (20, y + 1), (20, y + 15), (0, y + 15), (0, y + 1)], PIECE, 1.6)
+        pen.text(28, y + 8, "floating piece: its place is a guess", 13, anchor="lm")
+        y += 24
+    for line in marked.names:
+        pen.text(0, y, line, 13)
+        y += _NAMES_STEP
+
+
+def _names(alone: Sequence[Station], pieces: dict[int, list[Station]]) -> list[str]:
+    """Name, in lines, the stations without a mark on the plan and those of each floating piece."""
+    said = [(f"piece {number}, not tied yet", members) for number, members in pieces.items()]
+    said += [(status, [each for each in alone if each.status == status]) for status in ("unplaced", "dropped")]
+    lines = []
+    for what, members in said:
+        numbers = ", ".join(str(each.scan.index) for each in members)
+        lines += textwrap.wrap(f"{what}: {numbers}", 38) if numbers else []
+    return lines
 
 
 def _png(image: Image.Image, origin: Provenance) -> bytes:

@@ -63,18 +63,32 @@ class Pen:
         return [((x + self._left) * self._fine, (y + self._top) * self._fine) for x, y in points]
 
 
+def draw_ellipses(pen: Pen, frame: Frame, stations: Sequence[Station]) -> None:
+    """Draw the 95 % ellipse of every station that has a place."""
+    for station in stations:
+        if station.status in ("placed", "doubtful"):
+            pen.line(_ellipse(station, frame), STATION, 1.2)
+
+
 def draw_stations(pen: Pen, frame: Frame, stations: Sequence[Station]) -> None:
-    """Draw numbered stations with heading tick and 95 % ellipse; hollow where the place is doubtful."""
+    """Draw numbered stations with heading tick; hollow where the place is doubtful."""
     for station in stations:
         if station.status not in ("placed", "doubtful"):
             continue
         x, y = frame.place(station.pose.x_m, station.pose.y_m)
-        pen.line(_ellipse(station, frame), STATION, 1.2)
-        tick = station.pose.heading_rad
-        pen.line([(x, y), (x + 15 * math.sin(tick), y - 15 * math.cos(tick))], STATION, 2.2)
-        pen.disc(x, y, 4.5, STATION if station.status == "placed" else canvas.PAPER, STATION)
         label = str(station.scan.index) + ("?" if station.status == "doubtful" else "")
-        pen.text(x - 7 * math.sin(tick) + 5, y + 7 * math.cos(tick) + 3, label, 14, halo=True)
+        draw_station(pen, (x, y), station, label, (STATION if station.status == "placed" else canvas.PAPER, STATION))
+
+
+def draw_station(
+    pen: Pen, at: tuple[float, float], station: Station, label: str, colours: tuple[canvas.Colour, canvas.Colour]
+) -> None:
+    """Draw a disc (``colours`` of it and of its edge), the heading as a tick, and the label on the side without it."""
+    x, y = at
+    east, south = math.sin(station.pose.heading_rad), -math.cos(station.pose.heading_rad)
+    pen.line([(x, y), (x + 15 * east, y + 15 * south)], colours[1], 2.2)
+    pen.disc(x, y, 4.5, *colours)
+    pen.text(x - 16 * east, y - 16 * south, label, 14, anchor="mm", halo=True)
 
 
 def _ellipse(station: Station, frame: Frame) -> list[tuple[float, float]]:
