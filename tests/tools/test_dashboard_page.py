@@ -2,71 +2,20 @@
 
 from __future__ import annotations
 
-import shutil
 import time
-from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
-import pytest
-from numpy.typing import NDArray
-from playwright.sync_api import Browser, Page, Request, expect, sync_playwright
+from playwright.sync_api import Browser, Page, expect
 
+from daemon import mapshots
 from daemon.snapshots import Snapshot
-from tests.tools.fake_daemon import FakeDaemon
-from tests.tools.live_page import Dashboard, dashboard, free_port
-from tests.tools.sight import near, on_plan, orange, orange_share, picture, until
+from tests.tools.fake_daemon import FakeDaemon, stations
+from tests.tools.live_page import dashboard, free_port
+from tests.tools.sight import near, orange_share, picture, until
 
-FLAGS = [
-    "--headless=new", "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--no-first-run",
-    "--disable-component-update", "--disable-sync", "--disable-quic",
-]  # fmt: skip
-WALL, FREE, UNKNOWN = (11, 15, 19), (207, 216, 222), (89, 99, 109)
 STONE = (178, 170, 158)
-
-
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Browser]:
-    path = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-    if path is None:
-        pytest.skip("no Chromium on this machine: apt-get install chromium")
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=FLAGS)
-        yield browser
-        browser.close()
-
-
-@pytest.fixture(scope="module")
-def daemon() -> Iterator[FakeDaemon]:
-    served = FakeDaemon(free_port())
-    yield served
-    served.close()
-
-
-@pytest.fixture(scope="module")
-def served(daemon: FakeDaemon) -> Iterator[Dashboard]:
-    with dashboard(daemon.port) as running:
-        yield running
-
-
-@pytest.fixture
-def page(chromium: Browser, served: Dashboard) -> Iterator[Page]:
-    """The page, watched: an error in it, or a request to anywhere else, fails the test."""
-    wrong: list[str] = []
-    page = chromium.new_page(viewport={"width": 1366, "height": 650})
-    page.on("pageerror", lambda error: wrong.append(f"error: {error}"))
-    page.on("console", lambda said: wrong.append(f"console: {said.text}") if said.type == "error" else None)
-
-    def watch(request: Request) -> None:
-        if not request.url.startswith((served.url, "data:", "blob:")):
-            wrong.append(f"request to {request.url}")
-
-    page.on("request", watch)
-    page.goto(served.url)
-    expect(page.locator("#link-word")).to_have_text("live")
-    expect(page.locator("#heading")).not_to_have_text("–")
-    yield page
-    page.close()
-    assert wrong == []
 
 
 def test_heading_depth_and_settings_stand_as_numbers(page: Page) -> None:
@@ -76,50 +25,6 @@ def test_heading_depth_and_settings_stand_as_numbers(page: Page) -> None:
     assert 37 <= int(page.locator("#heading").inner_text().removesuffix("°")) <= 47
     expect(page.locator("#site")).to_have_text("keyhole")
     assert page.title() == "keyhole · lacuna"
-
-
-def test_plan_shows_wall_water_unknown_and_fill_where_they_are(page: Page) -> None:
-    def colour(x_m: float, y_m: float) -> NDArray[np.uint8]:
-        px, py = on_plan(page, x_m, y_m)
-        return picture(page.locator("#plan"))[py - 1 : py + 2, px - 1 : px + 2]
-
-    assert near(colour(-3.0, 1.0), WALL).all()
-    assert near(colour(0.5, -1.2), FREE).all()
-    assert near(colour(-3.6, 0.5), UNKNOWN).all()
-    px, py = on_plan(page, 4.1, 0.0)
-    fill = picture(page.locator("#plan"))[py - 3 : py + 4, px - 12 : px + 13]
-    assert not near(fill, WALL).any(), "a fill must not look measured"
-    assert 0.1 < orange(fill).mean() < 0.9, "a fill is hatched"
-
-
-def test_a_surer_fill_is_stronger(page: Page) -> None:
-    def strength(x_m: float, y_m: float) -> float:
-        px, py = on_plan(page, x_m, y_m)
-        fill = picture(page.locator("#plan"))[py - 4 : py + 5, px - 8 : px + 9].astype(float)
-        return float(255 - np.percentile(fill[..., 2], 10))
-
-    assert strength(4.1, 0.0) > strength(-2.0, 3.1) + 30
-
-
-def test_the_pointer_tells_coordinates_evidence_fills_and_stations(page: Page) -> None:
-    def under(x_m: float, y_m: float) -> str:
-        px, py = on_plan(page, x_m, y_m)
-        page.locator("#plan").hover(position={"x": px, "y": py})
-        page.wait_for_timeout(150)
-        return page.locator("#plan-readout").inner_text()
-
-    assert "open water, measured, occupied 10 %" in under(0.5, -1.2)
-    assert "filled in, certainty" in under(4.1, 0.0)
-    assert "both walls are straight" in under(4.1, 0.0)
-    assert "station 2 placed" in under(1.6, 1.9)
-    assert "closes the hole" in under(-2.2, 2.0)
-
-
-def test_an_unplaced_station_says_why(page: Page) -> None:
-    expect(page.locator("#outside")).to_contain_text(
-        "Station 4 unplaced: two places fit equally well, 3.1 m apart along 090°"
-    )
-    expect(page.locator("#outside")).to_contain_text("Station 3 doubtful")
 
 
 def test_the_sonar_shows_the_wall_where_it_is(page: Page) -> None:
@@ -183,6 +88,25 @@ def test_a_feed_says_how_far_it_is_to_be_trusted(page: Page) -> None:
     expect(compass).to_contain_text("field 31.26, undisturbed 44.8")
     expect(depth).to_have_attribute("data-lamp", "green")
     expect(depth.locator(".doubt")).to_have_count(0)
+
+
+def test_what_the_walls_say_of_the_compass_is_one_line(page: Page, daemon: FakeDaemon) -> None:
+    compass = page.locator("#compass")
+    expect(compass).to_contain_text("Compass, by the walls at 3 stations: bias 0.0 ± ")
+    expect(compass).not_to_contain_text("disturbed")
+    told = mapshots.stations((0, time.time_ns()), stations())
+    facts: dict[str, Any] = {
+        "stations": 9, "bias_deg": -2.04, "bias_sd_deg": 0.61, "deviation_deg": 3.5, "deviation_sd_deg": 1.2,
+        "curve": [], "disturbed": [3, 7],
+    }  # fmt: skip
+    daemon.say(replace(told, fields={**told.fields, "compass": facts}))
+    expect(compass).to_have_text(
+        "Compass, by the walls at 9 stations: bias −2.0 ± 0.6°, deviation 3.5 ± 1.2°, disturbed at 3, 7"
+    )
+    daemon.say(replace(told, fields={**told.fields, "compass": None}))
+    expect(compass).to_be_hidden()
+    daemon.say(told)
+    expect(compass).to_be_visible()
 
 
 def test_the_surface_is_shown_and_tared_only_when_confirmed(page: Page, daemon: FakeDaemon) -> None:

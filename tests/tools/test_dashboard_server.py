@@ -6,7 +6,6 @@ import http.client
 import json
 import re
 import socket
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -21,19 +20,6 @@ import tools.dashboard.server
 from daemon.snapshots import Snapshot
 from tests.tools.fake_daemon import FakeDaemon
 from tests.tools.live_page import Dashboard, dashboard, free_port, lacuna
-
-
-@pytest.fixture(scope="module")
-def daemon() -> Iterator[FakeDaemon]:
-    served = FakeDaemon(free_port())
-    yield served
-    served.close()
-
-
-@pytest.fixture(scope="module")
-def page(daemon: FakeDaemon) -> Iterator[Dashboard]:
-    with dashboard(daemon.port) as served:
-        yield served
 
 
 def fetch(
@@ -68,16 +54,16 @@ def first_frames(url: str, wanted: set[str]) -> dict[str, dict[str, Any]]:
     return got
 
 
-def test_the_page_and_all_it_needs_come_from_here(page: Dashboard) -> None:
-    answer, body = fetch(page.url, "GET", "/")
+def test_the_page_and_all_it_needs_come_from_here(served: Dashboard) -> None:
+    answer, body = fetch(served.url, "GET", "/")
     assert answer.status == 200
     assert "default-src 'self'" in str(answer.getheader("content-security-policy"))
     for path in re.findall(r'(?:src|href)="([^"]+)"', body.decode()):
-        assert fetch(page.url, "GET", f"/{path}")[0].status == 200, path
-    answer, body = fetch(page.url, "GET", "/plotly.min.js")
+        assert fetch(served.url, "GET", f"/{path}")[0].status == 200, path
+    answer, body = fetch(served.url, "GET", "/plotly.min.js")
     assert answer.status == 200
     assert b"plotly.js v" in body[:200]
-    assert fetch(page.url, "GET", "/static/../server.py")[0].status == 404
+    assert fetch(served.url, "GET", "/static/../server.py")[0].status == 404
 
 
 def test_no_address_of_another_machine_stands_in_the_page() -> None:
@@ -88,19 +74,19 @@ def test_no_address_of_another_machine_stands_in_the_page() -> None:
         )
 
 
-def test_a_new_page_gets_all_that_is_known(page: Dashboard) -> None:
-    got = first_frames(page.url, {"bridge", "grid/key", "station", "fill", "mesh", "guide", "health", "ping"})
+def test_a_new_page_gets_all_that_is_known(served: Dashboard) -> None:
+    got = first_frames(served.url, {"bridge", "grid/key", "station", "fill", "mesh", "guide", "health", "ping"})
     assert [each["name"] for each in got["mesh"]["arrays"]] == ["vertices", "triangles", "kind", "certainty"]
     assert got["grid/key"]["arrays"][0]["shape"] == [2, 160, 220]
     assert got["grid/key"]["as_of"]["topic"] == "grid/key"
     assert got["bridge"]["silent_s"] is not None
 
 
-def test_a_request_reaches_the_daemon_and_its_answer_the_page(page: Dashboard, daemon: FakeDaemon) -> None:
-    assert ask(page.url, {"id": 7, "do": "hint", "dx_m": 1.5, "dy_m": -0.5}) == (200, {"id": 7, "ok": True})
+def test_a_request_reaches_the_daemon_and_its_answer_the_page(served: Dashboard, daemon: FakeDaemon) -> None:
+    assert ask(served.url, {"id": 7, "do": "hint", "dx_m": 1.5, "dy_m": -0.5}) == (200, {"id": 7, "ok": True})
     assert daemon.heard[-1].do == "hint"
     assert daemon.heard[-1].fields["dx_m"] == 1.5
-    status, answer = ask(page.url, {"id": "x", "do": "sonar", "range_m": 200.0})
+    status, answer = ask(served.url, {"id": "x", "do": "sonar", "range_m": 200.0})
     assert (status, answer["error"]["message"]) == (200, "the head reaches 100 m.")
 
 
@@ -112,41 +98,43 @@ def test_a_request_reaches_the_daemon_and_its_answer_the_page(page: Dashboard, d
         ({"id": 1, "do": "sonar", "gain_pct": 900}, "invalid"),
     ],
 )
-def test_a_wrong_request_is_answered_in_words(page: Dashboard, daemon: FakeDaemon, request_: object, code: str) -> None:
+def test_a_wrong_request_is_answered_in_words(
+    served: Dashboard, daemon: FakeDaemon, request_: object, code: str
+) -> None:
     before = len(daemon.heard)
-    status, answer = ask(page.url, request_)
+    status, answer = ask(served.url, request_)
     assert (status, answer["error"]["code"]) == (400, code)
     assert answer["error"]["hint"]
     assert len(daemon.heard) == before
 
 
-def test_other_pages_and_forms_are_refused(page: Dashboard, daemon: FakeDaemon) -> None:
+def test_other_pages_and_forms_are_refused(served: Dashboard, daemon: FakeDaemon) -> None:
     before = len(daemon.heard)
     mark = {"id": 1, "do": "mark"}
-    assert ask(page.url, mark, origin="http://evil.example")[0] == 403
-    assert ask(page.url, mark, host="evil.example")[0] == 421
-    assert ask(page.url, mark, content_type="text/plain")[0] == 415
-    assert ask(page.url, {"id": 1, "do": "note", "text": "x" * 20_000})[0] == 400
+    assert ask(served.url, mark, origin="http://evil.example")[0] == 403
+    assert ask(served.url, mark, host="evil.example")[0] == 421
+    assert ask(served.url, mark, content_type="text/plain")[0] == 415
+    assert ask(served.url, {"id": 1, "do": "note", "text": "x" * 20_000})[0] == 400
     assert len(daemon.heard) == before
     with (
         pytest.raises(InvalidStatus),
-        connect(page.url.replace("http", "ws") + "ws", origin=Origin("http://evil.example")),
+        connect(served.url.replace("http", "ws") + "ws", origin=Origin("http://evil.example")),
     ):
         pass
 
 
 def test_without_a_daemon_a_request_is_answered_all_the_same() -> None:
-    with dashboard(free_port()) as page:
-        status, answer = ask(page.url, {"id": 1, "do": "save"})
+    with dashboard(free_port()) as served:
+        status, answer = ask(served.url, {"id": 1, "do": "save"})
         assert (status, answer["error"]["code"]) == (200, "no-answer")
         assert "lacuna run" in answer["error"]["hint"]
-        assert first_frames(page.url, {"bridge"})["bridge"]["silent_s"] is None
+        assert first_frames(served.url, {"bridge"})["bridge"]["silent_s"] is None
 
 
 def test_a_page_that_does_not_read_slows_nobody_and_ends_on_the_newest() -> None:
     daemon = FakeDaemon(free_port())
     try:
-        with dashboard(daemon.port) as page, listening(page.url) as slow, listening(page.url) as quick:
+        with dashboard(daemon.port) as served, listening(served.url) as slow, listening(served.url) as quick:
             noise = np.random.default_rng(1).random((200_000, 3), np.float32)
             for number in range(1, 31):
                 daemon.say(Snapshot("mesh", number, number, {"number": number}, {"vertices": noise}))
@@ -181,19 +169,19 @@ def test_keys_open_a_daemon_that_has_them_and_nothing_else_does(tmp_path: Path) 
     assert lacuna("keygen", str(keys)).returncode == 0
     daemon = FakeDaemon(free_port(), keys=str(keys))
     try:
-        with dashboard(daemon.port, "--keys", str(keys)) as page:
-            assert first_frames(page.url, {"bridge", "station", "ping"})["ping"]["session"] == "session-one"
-            assert ask(page.url, {"id": 1, "do": "mark"}) == (200, {"id": 1, "ok": True})
-        with dashboard(daemon.port) as page:
-            assert ask(page.url, {"id": 1, "do": "mark"})[1]["error"]["code"] == "no-answer"
-            assert first_frames(page.url, {"bridge"})["bridge"]["silent_s"] is None
+        with dashboard(daemon.port, "--keys", str(keys)) as served:
+            assert first_frames(served.url, {"bridge", "station", "ping"})["ping"]["session"] == "session-one"
+            assert ask(served.url, {"id": 1, "do": "mark"}) == (200, {"id": 1, "ok": True})
+        with dashboard(daemon.port) as served:
+            assert ask(served.url, {"id": 1, "do": "mark"})[1]["error"]["code"] == "no-answer"
+            assert first_frames(served.url, {"bridge"})["bridge"]["silent_s"] is None
     finally:
         daemon.close()
 
 
 def test_a_token_lets_in_once_and_leaves_the_address() -> None:
-    with dashboard(free_port(), "--token", "correct horse") as page:
-        origin, _, query = page.url.partition("?")
+    with dashboard(free_port(), "--token", "correct horse") as served:
+        origin, _, query = served.url.partition("?")
         assert fetch(origin, "GET", "/")[0].status == 403
         answer, _ = fetch(origin, "GET", f"/?{query}")
         assert (answer.status, answer.getheader("location")) == (303, "/")

@@ -34,3 +34,14 @@ export function lines(port) {
 export function surfaces(ports) {
   return Object.entries(ports).filter(([, port]) => port.surface).map(([name, port]) => ({ name, text: `${port.surface.mbar.toFixed(1)} mbar, ${port.surface.origin}` }));
 }
+
+/** What the walls say of the compass (`compass` of the stations' snapshot) in a line, and where it was disturbed. */
+export function compassLine(facts) {
+  if (!facts) return ["", ""];
+  const figure = (name, value, sd) => `${name} ${value.toFixed(1)} ± ${sd.toFixed(1)}°`.replaceAll(" ", "\u00a0").replace("-", "\u2212");
+  const bias = figure("bias", facts.bias_deg, facts.bias_sd_deg);
+  const deviation = figure("deviation", facts.deviation_deg, facts.deviation_sd_deg);
+  const { disturbed, stations } = facts;
+  const line = `Compass, by the walls at ${stations} station${stations === 1 ? "" : "s"}: ${bias}, ${deviation}`;
+  return [line, disturbed.length ? `disturbed at ${disturbed.join(", ")}` : ""];
+}

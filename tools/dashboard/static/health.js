@@ -41,6 +41,8 @@ function number(value) {
 export function phrase(name, value) {
   const shown = number(value);
   const unit = /_(s|m|deg|mib|pct)$/.exec(name)?.[1];
+  if (name === "skipped") return `${shown} bytes skipped`;
+  if (name === "lost") return `lost ${value === 1 ? "once" : `${shown} times`}`;
   if (/(bytes|pings|readings|frames|messages)_s$/.test(name)) return `${shown} ${name.slice(0, -2).replaceAll("_", " ")}/s`;
   if (!unit) return `${name.replaceAll("_", " ")} ${shown}`;
   return `${name.slice(0, -unit.length - 1).replaceAll("_", " ")} ${shown} ${{ deg: "°", mib: "MiB", pct: "%" }[unit] ?? unit}`;
@@ -99,18 +101,18 @@ function rest(header) {
   return Object.fromEntries(Object.entries(header).filter(([name]) => !SHOWN.has(name)));
 }
 
-/** What stands beside a port at all times: rates and losses. The rest is in its title and under Health. */
-const isBrief = (key) => (key.endsWith("_s") && key !== "last_s" && key !== "age_s") || ["lost", "skipped", "error"].includes(key);
+/** What stands beside a port at all times: rates, and losses where there are any. The rest is in its title and under Health. */
+const isBrief = ([key, value]) => value !== null && ((key.endsWith("_s") && key !== "last_s" && key !== "age_s") || (["lost", "skipped", "error"].includes(key) && value !== 0));
 
 function portItem(name, port) {
   const { lamp, word } = judge(port);
   const item = element("li");
   item.dataset.lamp = lamp;
   item.dataset.port = name;
-  const details = Object.entries(port).filter(([key, value]) => isBrief(key) && value !== null);
+  const details = Object.entries(port).filter(isBrief);
   item.title = flatten(port).map(([key, value]) => `${key} ${number(value)}`).join("\n");
   item.append(element("i", "lamp"), element("span", "name", name), element("span", "word", word));
-  item.append(element("span", "detail", details.map(([key, value]) => phrase(key, value)).join("  ·  ")));
+  item.append(element("span", "detail", details.map(([key, value]) => phrase(key, value).replaceAll(" ", "\u00a0")).join(" · ")));
   for (const [line, isDoubt] of lines(port)) item.append(element("span", isDoubt ? "detail doubt" : "detail", line));
   return item;
 }

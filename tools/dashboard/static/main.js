@@ -1,6 +1,7 @@
 // Wires the page: messages to pictures, keys to actions, silence to a banner.
 
 import { Commands } from "./commands.js";
+import { compassLine } from "./feeds.js";
 import { Health } from "./health.js";
 import { MeshView } from "./mesh.js";
 import { Plan } from "./plan.js";
@@ -19,7 +20,7 @@ const page = { session: null, heard: null, open: false, bridge: {}, pings: [] };
 
 const TOPICS = {
   ping: showPing,
-  station: (message) => { plan.push(message); commands.setStations(message.header.stations); },
+  station: (message) => { plan.push(message); commands.setStations(message.header.stations); showCompass(message.header.compass); },
   "grid/key": (message) => plan.push(message),
   "grid/delta": (message) => plan.push(message),
   fill: (message) => plan.push(message),
@@ -51,6 +52,7 @@ function clear() {
   page.pings = [];
   commands.setStations([]);
   showGoals([]);
+  showCompass(null);
   for (const name of ["heading", "depth", "bearing", "range", "gain", "turn"]) setNumber(name, null);
 }
 
@@ -92,6 +94,14 @@ function showGoals(goals) {
     return item;
   }));
   if (!goals.length) find("goals").innerHTML = '<li class="empty">Nothing to suggest yet.</li>';
+}
+
+function showCompass(facts) {
+  const [line, doubt] = compassLine(facts);
+  const bold = document.createElement("b");
+  bold.textContent = doubt;
+  find("compass").replaceChildren(line, doubt ? ", " : "", bold);
+  find("compass").hidden = !line;
 }
 
 function showSite(header) {

@@ -67,7 +67,7 @@ export function drawStations(g, view, stations, newest) {
   }
 }
 
-function drawStation(g, x, y, station, ink, newest) {
+export function drawStation(g, x, y, station, ink, newest) {
   const a = ((station.heading_deg ?? 0) * Math.PI) / 180;
   g.lineWidth = 2;
   g.strokeStyle = ink;
@@ -155,11 +155,11 @@ function plate(g, x, y, width, height) {
   g.fill();
 }
 
-function caption(g, text, x, y, ink, font) {
+export function caption(g, text, x, y, ink, font, align = "left") {
   g.lineJoin = "round";
   g.lineWidth = 3.5;
   g.strokeStyle = HALO;
-  setFont(g, font, "left");
+  setFont(g, font, align);
   g.strokeText(text, x, y);
   g.fillStyle = ink;
   g.fillText(text, x, y);

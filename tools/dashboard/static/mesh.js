@@ -139,7 +139,7 @@ function layout() {
       xaxis: axis("east, m"),
       yaxis: axis("north, m"),
       zaxis: { ...axis("depth, m"), autorange: "reversed" },
-      camera: { eye: { x: -1.1, y: -1.7, z: 1.35 }, center: { x: 0, y: 0, z: -0.15 } },
+      camera: { eye: { x: -1.35, y: -2.05, z: 1.65 }, center: { x: -0.1, y: 0.065, z: -0.15 } },
     },
   };
 }

@@ -2,6 +2,7 @@
 
 import { Evidence, Fills } from "./grid.js";
 import { drawEllipses, drawGoals, drawNorth, drawOpenEnds, drawScaleBar, drawStations, drawTrack, hasPlace } from "./marks.js";
+import { drawPieces, pieceWords, piecesOf } from "./pieces.js";
 import { View } from "./view.js";
 
 const UNKNOWN = "#59636d";
@@ -23,11 +24,9 @@ export class Plan {
   clear() {
     this.evidence.clear();
     this.fills.clear();
-    this.stations = [];
-    this.newest = null;
     this.goals = [];
     this.view.touched = false;
-    this.listOutside();
+    this.setStations({ stations: [], newest: null });
     this.request();
   }
 
@@ -46,21 +45,27 @@ export class Plan {
   setStations(header) {
     this.stations = header.stations;
     this.newest = header.newest;
+    this.pieces = piecesOf(this.stations);
+    const inPieces = new Set(this.pieces.flatMap((piece) => piece.members));
+    this.alone = this.stations.filter((station) => !inPieces.has(station));
+    this.canvas.closest(".map").toggleAttribute("data-pieces", this.pieces.length > 0);
     this.listOutside();
   }
 
-  /** Stations that are kept out of the map, and why: in words, whether or not they have a place. */
+  /** Stations that are kept out of the map, and why, newest first: in words, whether or not they have a place. */
   listOutside() {
-    const out = this.stations.filter((station) => station.status === "unplaced" || station.status === "doubtful");
-    this.outside.hidden = out.length === 0;
-    this.outside.replaceChildren(...out.map((station) => {
+    const out = this.alone.filter((station) => station.status === "unplaced" || station.status === "doubtful").reverse();
+    const said = out.map((station) => [station.status, `Station ${station.station} ${station.status}`, station.why ? `: ${station.why}` : ""]);
+    const items = [...this.pieces.map((piece) => ["piece", ...pieceWords(piece)]), ...said].map(([kind, name, why]) => {
       const item = document.createElement("li");
-      const name = document.createElement("b");
-      item.className = station.status;
-      name.textContent = `Station ${station.station} ${station.status}`;
-      item.append(name, station.why ? `: ${station.why}` : "");
+      const bold = document.createElement("b");
+      item.className = kind;
+      bold.textContent = name;
+      item.append(bold, why);
       return item;
-    }));
+    });
+    this.outside.hidden = items.length === 0;
+    this.outside.replaceChildren(...items);
   }
 
   fit() {
@@ -99,9 +104,10 @@ export class Plan {
     this.drawEvidence(g);
     this.drawFills(g);
     drawOpenEnds(g, view, this.fills.openEnds);
-    drawEllipses(g, view, this.stations);
-    drawTrack(g, view, this.stations);
-    drawStations(g, view, this.stations, this.newest);
+    drawEllipses(g, view, this.alone);
+    drawTrack(g, view, this.alone);
+    drawPieces(g, view, this.pieces, this.newest);
+    drawStations(g, view, this.alone, this.newest);
     drawGoals(g, view, this.goals);
     drawScaleBar(g, view);
     drawNorth(g, view);
@@ -153,7 +159,9 @@ export class Plan {
     const goal = this.goals.find(near);
     const filled = this.fills.at(x, y);
     const cell = this.evidence.at(x, y);
-    if (station) parts.push(describeStation(station));
+    const piece = this.pieces.find(({ members }) => members.includes(station));
+    if (piece) parts.push(`station ${station.station} of piece ${piece.number}, not tied yet: its place is a guess`);
+    else if (station) parts.push(describeStation(station));
     else if (goal) parts.push(`go here next: ${goal.why}`);
     else if (filled) parts.push(describeFill(filled));
     else if (cell) parts.push(cell.state ? `${STATES[cell.state]}, measured, occupied ${(cell.occupancy * 100).toFixed(0)} %` : STATES[0]);
