@@ -17,7 +17,8 @@ export function piecesOf(stations) {
   return [...found].filter(([, members]) => members.length > 1).map(([number, members]) => ({ number, members }));
 }
 
-export function drawPieces(g, view, pieces, newest) {
+export function drawPieces(g, view, pieces, alone, newest) {
+  const others = alone.filter(hasPlace).map((station) => view.toScreen(station.x_m, station.y_m));
   for (const { number, members } of pieces) {
     const places = members.map((station) => view.toScreen(station.x_m, station.y_m));
     const edge = outline(places);
@@ -32,12 +33,19 @@ export function drawPieces(g, view, pieces, newest) {
       drawStation(g, ...places[i], { ...station, status: "doubtful" }, PIECE, station.station === newest);
       caption(g, String(station.station), places[i][0] + 9, places[i][1] - 9, PIECE, "600 12px");
     });
-    const top = edge.reduce((a, b) => (b[1] < a[1] ? b : a));
-    const label = `piece ${number}: not tied yet`;
-    const half = label.length * 3.4;
-    const x = Math.min(Math.max(top[0], half + 6), Math.max(view.width - half - 6, half + 6));
-    caption(g, label, x, Math.max(top[1] - 10, 12), PIECE, "600 12px", "center");
+    label(g, view, edge, others, `piece ${number}: not tied yet`);
   }
+}
+
+/** Write above the outline, or below where another station stands in the way. */
+function label(g, view, edge, others, words) {
+  const half = words.length * 3.4;
+  const inside = (x) => Math.min(Math.max(x, half + 6), Math.max(view.width - half - 6, half + 6));
+  const top = edge.reduce((a, b) => (b[1] < a[1] ? b : a));
+  const bottom = edge.reduce((a, b) => (b[1] > a[1] ? b : a));
+  const spots = [[inside(top[0]), Math.max(top[1] - 10, 12)], [inside(bottom[0]), bottom[1] + 12]];
+  const isFree = ([x, y]) => others.every(([ox, oy]) => Math.abs(ox + 8 - x) > half + 14 || Math.abs(oy - 5 - y) > 18);
+  caption(g, words, ...(spots.find(isFree) ?? spots[0]), PIECE, "600 12px", "center");
 }
 
 /** The line under the plan that tells of a piece. */

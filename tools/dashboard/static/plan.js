@@ -106,7 +106,7 @@ export class Plan {
     drawOpenEnds(g, view, this.fills.openEnds);
     drawEllipses(g, view, this.alone);
     drawTrack(g, view, this.alone);
-    drawPieces(g, view, this.pieces, this.newest);
+    drawPieces(g, view, this.pieces, this.alone, this.newest);
     drawStations(g, view, this.alone, this.newest);
     drawGoals(g, view, this.goals);
     drawScaleBar(g, view);
