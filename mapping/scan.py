@@ -100,12 +100,12 @@ class ScanBuilder:
         self._run: list[tuple[int, int, float]] = []  # steady beams, their partners (in _beams), and their grain
         self._frozen = 0  # beams on end whose grain is frozen
         self._still_frozen = False  # whether grain tells the end of this rest
+        self._doubted = False  # whether grain spoke of motion when its scan was given
         self._common_profile = np.zeros(0)
         self._common_age = 0
         self._verdicts: list[bool] = []
         self._unsteady = 0
-        self._resting = False
-        self._moved = False
+        self._resting = self._moved = False
         self._loose = 0  # beams on end that agree without their grain
 
     def _release(self, now_ns: int) -> list[Scan]:
@@ -160,9 +160,10 @@ class ScanBuilder:
         return self._agree(earlier, grain) if verdict else self._disagree()
 
     def _watch(self) -> None:
-        """Watch for the end of a rest whose scan was given."""
-        begun = self._grainy and not self._still_frozen and self._frozen >= GRAIN_BEAMS
-        if begun or self._verdicts.count(False) >= LEFT_SHARE * LEFT_OF:
+        """Watch for the end of a rest whose scan was given, or for its true begin where that was given under way."""
+        settled = self._grainy and not self._still_frozen and self._frozen >= GRAIN_BEAMS
+        self._still_frozen |= settled
+        if (settled and self._doubted) or self._verdicts.count(False) >= LEFT_SHARE * LEFT_OF:
             self._resting, self._moved, self._unsteady, self._still_frozen = False, True, 0, False
             self._run.clear()
 
@@ -184,8 +185,7 @@ class ScanBuilder:
         if self._unsteady < UNSTEADY_PINGS:
             return []
         scans = self._emit(0.5) if self._confirmed_late(CONFIRM_LEFT_RAD) else []
-        self._moved = True
-        self._loose = 0
+        self._moved, self._loose = True, 0
         self._run.clear()
         return scans
 
@@ -244,6 +244,7 @@ class ScanBuilder:
         """
         first, earlier, _ = self._run[int(settled * (len(self._run) - 1))]
         self._verdicts.clear()
+        self._doubted = self._is_loose()
         self._still_frozen = self._grain() > GRAINY and not math.isnan(self._run[-1][2])
         self._grainy |= self._still_frozen
         leg = self._beams[self._run[-1][1]].leg
@@ -266,8 +267,7 @@ class ScanBuilder:
         if not beams or abs(beams[-1].turn_rad - beams[0].turn_rad) < PARTIAL_RAD:
             return []
         start_ns, end_ns = beams[0].ping.t_ns, beams[-1].ping.t_ns
-        heading = steady_headings(beams)
-        reference = float(heading.mean())
+        reference = float((heading := steady_headings(beams)).mean())
         depths = self._depths.within(start_ns, end_ns)
         depth = self._depths.at(end_ns) if len(self._depths) else math.nan
         scan = Scan(

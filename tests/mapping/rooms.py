@@ -49,7 +49,7 @@ def cast(walls: NDArray[np.float64], x_m: float, y_m: float, direction_rad: floa
     a, e = walls, np.roll(walls, -1, axis=0) - walls
     q = a - [x_m, y_m]
     den = d[0] * e[:, 1] - d[1] * e[:, 0]
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         t = (q[:, 0] * e[:, 1] - q[:, 1] * e[:, 0]) / den
         u = (q[:, 0] * d[1] - q[:, 1] * d[0]) / den
     hit = np.where((t > 1e-9) & (u >= 0.0) & (u <= 1.0), t, np.inf)

@@ -60,5 +60,6 @@ def test_a_featureless_tunnel_is_placed_with_odometry(stations: int) -> None:
     pipeline.finish()
     figures = judge(there, pipeline.state, config)
     assert (figures.placed, figures.wrong, figures.stray) == (stations, 0, 0)
+    assert len(pipeline.state.stations) == stations, "one rest is one scan"
     assert figures.error_max_m < 0.3
     assert pipeline.state.stations[-1].covariance[0, 0] > 0.1**2, "it may slide, and says so"
