@@ -33,7 +33,8 @@ def told(
     stations = dict(enumerate(judged))
     for piece in sorted(pieces.all, key=lambda p: (p != the_map, p[0])):
         guess = guesses.get(piece[0])
-        at = Pose(0.0, 0.0, pieces.pose(piece[0]).heading_rad)
+        # A piece that began where it fitted badly has axes as wrong: north is what the compass said at its first.
+        at = Pose(0.0, 0.0, judged[piece[0]].scan.heading_rad)
         if piece != the_map and guess is not None and pieces.of(guess.base):
             at = put_at(stations[guess.base].pose, guess.seen)
         number = 0 if piece == the_map else judged[piece[0]].scan.index + 1
