@@ -13,9 +13,7 @@ from fill.closing import fill_cells, open_walls
 from fill.matching import candidates
 from fill.memory import Memory
 from fill.prior import prior
-from fill.scene import from_water
 from fill.segments import End
-from fill.settling import settled
 from mapping.values import OCCUPIED
 
 _REACH: Final = 20.0  # cells: no knocked-out piece is as long
@@ -33,14 +31,13 @@ def fill_told(seen: NDArray[np.uint8], gone: NDArray[np.bool_]) -> NDArray[np.bo
     if not found:
         return filled
     chances = prior().hole.chance(np.stack([each.features for each in found]))
-    water = from_water(seen)
     pieces, count = ndimage.label(gone, _EIGHT)
     for number in range(1, count + 1):
         away = ndimage.distance_transform_edt(pieces != number)
         own = [index for index, each in enumerate(found) if _belongs(each, away)]
         if own:
             best = found[max(own, key=lambda index: chances[index])]
-            for cells in fill_cells(settled(best, seen, water), seen, wall):
+            for cells in fill_cells(best, seen, wall):
                 filled[cells[:, 0], cells[:, 1]] = True
     return filled
 
