@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from config.schema import Fill
 from fill.certainty import DESIGN, HIGHEST, LOWEST, falling
-from fill.drill import BANDS, SIZES, drill, hits_share, wall_lines
 from fill.filler import Filler
 from fill.knockout import EXAMS, knock_out, places, window
 from fill.lessons import Lesson, taught
@@ -123,38 +122,3 @@ def test_an_exam_takes_wall_or_the_water_of_an_opening_and_nothing_else() -> Non
             assert changed.any()
             assert np.all(exam.state[changed] == UNKNOWN)
     assert held
-
-
-def one_by_one(line: Floats, size: int) -> int:
-    """Cells hit in all holes of a size, by one polynomial fit a hole."""
-    hits = 0
-    known = np.concatenate([np.arange(8), np.arange(size + 8, size + 16)])
-    between = np.arange(8, size + 8)
-    for start in range(len(line) - size - 15):
-        part = line[start : start + size + 16]
-        weights = np.polyfit(known, part[known], 1 if size <= 8 else 2)
-        told = np.stack([np.polyval(weights[:, axis], between) for axis in (0, 1)], axis=1)
-        hits += int(np.count_nonzero(np.hypot(*(told - part[between]).T) <= 1.0))
-    return hits
-
-
-def test_the_drill_counts_what_a_fit_a_hole_would() -> None:
-    random = np.random.default_rng(2)
-    line = np.stack([np.arange(90.0), np.rint(np.cumsum(random.normal(0.0, 0.9, 90)) * 3.0) / 3.0], axis=1)
-    counts = drill([line])
-    assert counts.shape == (len(SIZES), BANDS, 2)
-    for index, size in enumerate(SIZES):
-        assert int(counts[index, :, 0].sum()) == pytest.approx(one_by_one(line, size), abs=1)
-        assert int(counts[index].sum()) == size * (90 - size - 15)
-
-
-def test_walls_drilled_apart_or_together_give_the_same_counts() -> None:
-    mask = np.zeros((60, 200), bool)
-    mask[10, 5:195] = True
-    mask[30:32, 5:150] = True
-    mask[40:58, 170] = True
-    lines = wall_lines(mask)
-    assert sum(len(line) for line in lines) > 100
-    assert np.array_equal(drill(lines), sum(drill([line]) for line in lines))
-    assert not drill([]).any()
-    assert np.allclose(hits_share(drill([]), 9.0, np.array([1.0, 4.0])), 0.9)
