@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from fill.logistic import Logistic
 from tools.bench.holes_judge import LossVerdict, Verdict
 
 Figures = dict[str, float]
@@ -48,7 +49,10 @@ def figures(verdicts: Sequence[Verdict], random: np.random.Generator) -> Figures
 
 
 def trust(losses: Sequence[LossVerdict]) -> Figures:
-    """Brier skill against the base rate, and expected calibration error over bins of equal mass."""
+    """Brier skill against the base rate, expected calibration error over bins of equal mass, and what would mend it.
+
+    ``level`` and ``slope`` are those of a logistic regression of what was right on the log-odds told: 0 and 1 are best.
+    """
     right = np.concatenate([each.right for each in losses] or [np.zeros(0, bool)]).astype(np.float64)
     told = np.concatenate([each.certainty for each in losses] or [np.zeros(0)])
     if not len(right) or np.isnan(told).any():
@@ -58,7 +62,16 @@ def trust(losses: Sequence[LossVerdict]) -> Figures:
     order = np.argsort(told, kind="stable")
     bins = [part for part in np.array_split(order, _BINS) if len(part)]
     ece = sum(len(part) * abs(float(told[part].mean() - right[part].mean())) for part in bins) / len(right)
-    return {"brier_skill": skill, "ece": ece}
+    level, slope = _mended(told, right)
+    return {"brier_skill": skill, "ece": ece, "level": level, "slope": slope}
+
+
+def _mended(told: NDArray[np.float64], right: NDArray[np.float64]) -> tuple[float, float]:
+    clipped = np.clip(told, 0.01, 0.99)
+    features = np.stack([np.ones_like(clipped), np.log(clipped / (1.0 - clipped))], axis=1)
+    free = Logistic(np.array([0.0, 1.0]), 1e-3 * np.eye(2))
+    level, slope = free.taught(features, right, np.ones_like(right)).weights
+    return float(level), float(slope)
 
 
 def bootstrap(
