@@ -137,8 +137,7 @@ class Stations:
         first = judged[0] if judged else origin(sight.scan, config)
         if bases:
             self._guesses[i] = Guess(bases[0], seen_from(self._pieces.pose(bases[0]), first.pose))
-        # A hint is told in the compass's axes: a piece that begins where nothing fits must not begin turned.
-        self._pieces.begin(i, sight, replace(first.pose, heading_rad=sight.scan.heading_rad))
+        self._pieces.begin(i, sight, first.pose)
         return first
 
     def _bases(self, i: int) -> list[int]:
