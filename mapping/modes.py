@@ -14,7 +14,7 @@ from mapping.values import Pose
 ELSEWHERE_M = 0.6
 ELSEWHERE_RAD = math.radians(25.0)
 """Poses nearer than this are the same answer."""
-BENT_SD_M = 0.008
+BENT_SD_M = 0.012
 """What scans are bent by, and walls do not tell: no pose is surer than this."""
 RIDGE_STEP_M = 0.15
 RIDGE_DIP = 4.0
