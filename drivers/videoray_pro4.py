@@ -39,7 +39,6 @@ _NAVIGATION: Final = 9
 """Bytes of device type, heading, pitch, roll and depth, with which every reply to a navigation request begins."""
 _DUMP: Final = 0x80
 _PRESSURE_AT: Final = 0x66
-_HEADING_AT: Final = 0x68
 
 NAVIGATION_REQUEST: Final = bytes.fromhex("faaf010500005100")
 """Asks for navigation and health with no data of its own: nothing in the vehicle is written."""

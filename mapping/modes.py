@@ -30,15 +30,6 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
-class Mode:
-    """A pose, its ``covariance`` ``(3, 3)`` over x_m, y_m, heading_rad, and its share ``weight`` of all modes."""
-
-    pose: Pose
-    covariance: Floats
-    weight: float
-
-
-@dataclass(frozen=True, slots=True)
 class Ridge:
     """A straight line of poses ``(n, 3)`` along which the posterior is high, with its moments."""
 

@@ -15,11 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mapping.likelihood import POINTS_A_WITNESS as POINTS_A_WITNESS
 from mapping.likelihood import SIGMA_M, Likelihood, Posterior
-from mapping.likelihood import WITNESSES as WITNESSES
-from mapping.modes import ELSEWHERE_M as ELSEWHERE_M
-from mapping.modes import ELSEWHERE_RAD, Mode, local_moments, pose_of, ridge_of
+from mapping.modes import ELSEWHERE_M, ELSEWHERE_RAD, local_moments, pose_of, ridge_of
 from mapping.prior import Prior
 from mapping.values import Pose
 from mapping.view import View, to_map
@@ -50,8 +47,6 @@ LEVELS = (
 JITTER_M = 0.5
 """Spread of resampled particles, as a share of the step's wall width; their headings likewise, per metre of lever."""
 LEVER_M = 4.0
-RIVAL_MARGIN = 12.0
-"""A pose elsewhere within this of the best one is told as a mode."""
 RIDGE_MARGIN = 4.0
 """A pose elsewhere within this of the best one may lie on the same ridge; of a ridge, the best pose tells little."""
 
@@ -68,8 +63,7 @@ class Match:
     ``height`` is the log-posterior, ``fit`` the same per independent point, ``other`` the best pose elsewhere.
 
     ``ridge`` tells that the posterior is one long mode: the pose is its mean, the covariance covers its length, and
-    ``margin`` and ``other`` are of poses off the ridge.  ``modes`` are all answers, the best first: this one and,
-    where its margin is small, the one elsewhere.
+    ``margin`` and ``other`` are of poses off the ridge.
     """
 
     pose: Pose
@@ -83,7 +77,6 @@ class Match:
     other: Pose
     astray: float
     ridge: bool
-    modes: tuple[Mode, ...]
 
 
 def register(scan: View, reference: View, prior: Prior, particles: int, rng: np.random.Generator) -> Match:
@@ -104,22 +97,10 @@ def register(scan: View, reference: View, prior: Prior, particles: int, rng: np.
     on_walls = overlap(scan, reference, best)
     fit = float(like.score(best[None, :])[0])
     margin, astray = height - other_height, prior.astray(mean)
-    modes = _modes(like, (pose_of(mean), covariance), other, margin)
     return Match(
         pose_of(mean), covariance, margin, on_walls, weak, hold, height, fit, pose_of(other), astray,
-        ridge is not None, modes,
+        ridge is not None,
     )  # fmt: skip
-
-
-def _modes(like: Likelihood, first: tuple[Pose, Floats], other: Floats, margin: float) -> tuple[Mode, ...]:
-    """Tell the answers, the best first; one that is far less likely is none."""
-    pose, covariance = first
-    if margin > RIVAL_MARGIN:
-        return (Mode(pose, covariance, 1.0),)
-    mean, other_covariance = local_moments(like, other)
-    widths = [math.sqrt(float(np.linalg.det(c))) for c in (covariance, other_covariance)]
-    weight = 1.0 / (1.0 + math.exp(-margin) * widths[1] / widths[0])
-    return Mode(pose, covariance, weight), Mode(pose_of(mean), other_covariance, 1.0 - weight)
 
 
 def search(

@@ -66,5 +66,4 @@ def unscaled(match: Match, scale: float, axis: Floats) -> Match:
     arm = np.array([pose.x_m, pose.y_m]) - axis
     covariance = match.covariance.copy()
     covariance[:2, :2] += ((scale - 1.0) * AXIS_SD_M) ** 2 * np.eye(2) + SCALE_SD**2 * np.outer(arm, arm)
-    modes = tuple(replace(mode, pose=of(mode.pose)) for mode in match.modes)
-    return replace(match, pose=pose, covariance=covariance, other=of(match.other), modes=modes)
+    return replace(match, pose=pose, covariance=covariance, other=of(match.other))

@@ -11,7 +11,7 @@ import pytest
 from drivers.readings import Odometry
 from mapping.led import LED_SD_M, along, led
 from mapping.odometry import REST_SD_M, UNSEEN_M_S, Odometer
-from mapping.prior import Prior
+from mapping.prior import Hint, Prior
 from mapping.register import Match
 from mapping.values import Displacement, Pose
 
@@ -84,7 +84,7 @@ def test_ways_are_joined_and_turned_into_the_map() -> None:
 
 MATCH = Match(
     pose=Pose(1.8, 0.3, 1.0), covariance=np.diag([0.04, 0.0004, 0.001]), margin=9.0, overlap=0.6, weak_rad=math.pi / 2,
-    hold=0.02, height=1.0, fit=0.7, other=Pose(0, 0, 0), astray=1.0, ridge=False, modes=(),
+    hold=0.02, height=1.0, fit=0.7, other=Pose(0, 0, 0), astray=1.0, ridge=False,
 )  # fmt: skip
 PRIOR = Prior(2.4, 0.0, 0.12, 1.0, 0.07, gaussian=True)
 
@@ -105,3 +105,11 @@ def test_the_least_uncertainty_of_odometry_is_below_a_pilot_s() -> None:
     prior = hint.prior(5.0, 5.0, 0.0, 0.1)
     assert (prior.reach_m, prior.is_led) == (LED_SD_M, True)
     assert prior.astray(np.array([6.0, 5.3, 0.0])) == pytest.approx(3.0)
+
+
+def test_a_hint_turned_and_back_is_the_hint() -> None:
+    hint = Hint(1.0, 2.0, 0.3)
+    east = hint.turned(math.pi / 2)
+    assert (east.dx_m, east.dy_m, east.sd_m) == pytest.approx((2.0, -1.0, 0.3))
+    back = east.turned(-math.pi / 2)
+    assert (back.dx_m, back.dy_m) == pytest.approx((1.0, 2.0))

@@ -61,15 +61,13 @@ def test_a_tunnel_is_one_long_mode_that_covers_the_truth() -> None:
     assert math.degrees(abs(match.weak_rad - (math.pi / 2.0 - 0.2))) < 6.0
 
 
-def test_two_answers_are_told_as_two_modes() -> None:
+def test_of_two_answers_the_other_is_told_too() -> None:
     """A rectangle turned by half a circle is itself: without a compass there are two places."""
     prior = Prior(1.5, -0.25, 3.0, math.pi / 2.0, math.pi / 2.0)
     here, there = seen(RECTANGLE, 0.0, -0.5, 0.0), seen(RECTANGLE, 2.6, -1.0, 0.0, seed=2)
     match = register(there.view, here.view, prior, 2000, np.random.default_rng(4))
     assert match.margin < 6.0
-    assert len(match.modes) == 2
-    assert sum(mode.weight for mode in match.modes) == pytest.approx(1.0)
-    apart = abs(match.modes[0].pose.heading_rad - match.modes[1].pose.heading_rad)
+    apart = abs(match.pose.heading_rad - match.other.heading_rad)
     assert math.degrees(abs(apart - math.pi)) < 10.0
     assert judge(there.scan, match, 0, prior, chained=True).status != "placed"
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from config.schema import Map
-from mapping.modes import Mode
 from mapping.register import Match
 from mapping.sight import Sight, sight_of
 from mapping.taper import axis_of, best_scaled, scaled, unscaled
@@ -29,8 +28,7 @@ def sight(walls: np.ndarray, x_m: float, y_m: float) -> Sight:
 
 
 def match_at(pose: Pose, height: float) -> Match:
-    mode = Mode(pose, 0.01 * np.eye(3), 1.0)
-    return Match(pose, 0.01 * np.eye(3), 20.0, 1.0, 0.0, 0.5, height, 1.5, Pose(9.0, 9.0, 0.0), 0.0, False, (mode,))
+    return Match(pose, 0.01 * np.eye(3), 20.0, 1.0, 0.0, 0.5, height, 1.5, Pose(9.0, 9.0, 0.0), 0.0, False)
 
 
 def test_the_axis_is_the_middle_of_the_open_water() -> None:
@@ -45,7 +43,7 @@ def test_a_scaled_scan_lies_on_the_walls_of_the_other_level_at_the_scaled_place(
     assert np.hypot(*(points - axis).T) == pytest.approx(2.0, abs=0.05)
     found = unscaled(match_at(Pose(float(at[0]), float(at[1]), 0.3), 5.0), scale, axis)
     assert (found.pose.x_m, found.pose.y_m, found.pose.heading_rad) == pytest.approx((1.5, 0.4, 0.3))
-    assert found.modes[0].pose == found.pose
+    assert (found.other.x_m, found.other.y_m) == pytest.approx(axis + scale * (np.array([9.0, 9.0]) - axis))
     assert np.linalg.eigvalsh(found.covariance[:2, :2] - 0.01 * np.eye(2)).min() > 0.0
 
 

@@ -11,7 +11,8 @@ from playwright.sync_api import Browser, Page, expect
 
 from daemon import mapshots
 from daemon.snapshots import Snapshot
-from tests.tools.fake_daemon import FakeDaemon, stations
+from tests.tools.fake_daemon import FakeDaemon
+from tests.tools.fake_site import stations
 from tests.tools.live_page import dashboard, free_port
 from tests.tools.sight import near, orange_share, picture, until
 

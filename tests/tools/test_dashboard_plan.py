@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from playwright.sync_api import Page, expect
 
-from tests.tools.fake_daemon import PIECE_M
+from tests.tools.fake_site import PIECE_M
 from tests.tools.sight import near, on_plan, orange, picture
 
 PIECE = (122, 47, 208)

@@ -11,14 +11,14 @@ from PIL import Image
 
 from config.schema import Config
 from mapping.values import Station
-from tests.tools import fake_daemon
+from tests.tools import fake_site
 from tools.plan import Plan, draw_plan
 from tools.plan_pieces import PIECE, pieces_of, room_for
 from tools.provenance import provenance
 
 
 def plan(stations: list[Station]) -> Plan:
-    return draw_plan(fake_daemon.filled(*fake_daemon.grid()), stations, provenance(Config(), ("dive.mcap",), {}))
+    return draw_plan(fake_site.filled(*fake_site.grid()), stations, provenance(Config(), ("dive.mcap",), {}))
 
 
 def violet(drawn: Plan, x_m: tuple[float, float], y_m: tuple[float, float]) -> NDArray[np.bool_]:
@@ -30,15 +30,15 @@ def violet(drawn: Plan, x_m: tuple[float, float], y_m: tuple[float, float]) -> N
 
 
 def test_only_stations_that_hold_together_are_a_piece() -> None:
-    stations = fake_daemon.stations()
+    stations = fake_site.stations()
     assert {number: [s.scan.index for s in members] for number, members in pieces_of(stations).items()} == {6: [5, 6]}
     dropped = [replace(s, status="dropped") if s.scan.index == 6 else s for s in stations]
     assert pieces_of(dropped) == {}
 
 
 def test_a_piece_is_drawn_dashed_about_its_stations_and_nowhere_else() -> None:
-    drawn = plan(fake_daemon.stations())
-    (x0, y0), (x1, y1) = fake_daemon.PIECE_M
+    drawn = plan(fake_site.stations())
+    (x0, y0), (x1, y1) = fake_site.PIECE_M
     here = violet(drawn, (x0 - 0.5, x1 + 0.5), (y0 - 0.5, y1 + 0.5))
     assert here.sum() > 200
     assert not violet(drawn, (-3.0, 3.0), (-2.0, 3.0)).any()
@@ -48,13 +48,13 @@ def test_a_piece_is_drawn_dashed_about_its_stations_and_nowhere_else() -> None:
 
 
 def test_a_map_in_one_piece_has_no_such_colour() -> None:
-    drawn = plan([each for each in fake_daemon.stations() if each.piece != 6])
+    drawn = plan([each for each in fake_site.stations() if each.piece != 6])
     pixels = np.asarray(Image.open(io.BytesIO(drawn.png)).convert("RGB")).astype(int)
     assert not (np.abs(pixels - PIECE) < 40).all(axis=-1).any()
 
 
 def test_the_frame_holds_pieces_far_off_and_the_legend_all_names() -> None:
-    stations = fake_daemon.stations()
+    stations = fake_site.stations()
     two = [each for each in stations if each.piece == 6]
     number = range(10, 50, 2)
     many = [replace(s, piece=n, scan=replace(s.scan, index=n + k)) for n in number for k, s in enumerate(two)]

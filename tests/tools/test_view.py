@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from PIL import Image, ImageGrab
 
 from fill.values import FILLED, MEASURED
-from tests.tools.fake_daemon import FakeDaemon, mesh
+from tests.tools.fake_daemon import FakeDaemon
+from tests.tools.fake_site import mesh
 from tests.tools.live_page import free_port, lacuna
 from tools.ply import ply_bytes
 from tools.view import measured_only

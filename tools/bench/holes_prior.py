@@ -7,7 +7,6 @@ it together), and the figures are over all of them.  What is written is fitted t
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -232,7 +231,3 @@ def _area(chance: Floats, right: Floats) -> float:
     bad = len(right) - good
     summed = float(np.sum(rank[right > 0]))
     return (summed - good * (good + 1.0) / 2.0) / max(good * bad, 1.0)
-
-
-def _sd(covariance: Floats, axis: int) -> float:
-    return round(math.sqrt(float(covariance[axis, axis])), 3)
