@@ -32,8 +32,7 @@ def led(moved: Sequence[Displacement | None], turn_rad: float, *, back: bool, re
         return None
     sign = -1.0 if back else 1.0
     x_m, y_m = sign * sum(each.dx_m for each in told), sign * sum(each.dy_m for each in told)
-    sin, cos = math.sin(turn_rad), math.cos(turn_rad)
-    return Hint(cos * x_m + sin * y_m, cos * y_m - sin * x_m, sd_m, LED_SD_M)
+    return Hint(x_m, y_m, sd_m, LED_SD_M).turned(turn_rad)
 
 
 def along(match: Match, prior: Prior) -> Match:

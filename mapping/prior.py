@@ -128,6 +128,11 @@ class Hint:
         """Join this hint and the one for the way after it."""
         return Hint(self.dx_m + other.dx_m, self.dy_m + other.dy_m, math.hypot(self.sd_m, other.sd_m))
 
+    def turned(self, turn_rad: float) -> Hint:
+        """Tell the same in axes that are turned clockwise by so much against the compass."""
+        sin, cos = math.sin(turn_rad), math.cos(turn_rad)
+        return replace(self, dx_m=cos * self.dx_m + sin * self.dy_m, dy_m=cos * self.dy_m - sin * self.dx_m)
+
     def prior(self, from_x_m: float, from_y_m: float, heading_rad: float, heading_sd_rad: float) -> Prior:
         """Say where a scan may have been made that follows a known place."""
         sd_m = max(self.sd_m, self.least_sd_m)

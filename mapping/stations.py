@@ -166,13 +166,14 @@ class Stations:
         at, steps = self._pieces.pose(base), abs(base - i)
         heading, sd = self._heading(i, base)
         hint = self._hint(base, i)
+        compass = all(self._sights[k].scan.has_compass for k in (base, i))
         if hint is not None:
-            prior = hint.prior(at.x_m, at.y_m, heading, sd)
+            turn_rad = heading - self._sights[i].scan.heading_rad if compass else 0.0
+            prior = hint.turned(turn_rad).prior(at.x_m, at.y_m, heading, sd)
         elif (way := self._led(base, i)) is not None:
             prior = way.prior(at.x_m, at.y_m, heading, sd)
         else:
             prior = Prior(at.x_m, at.y_m, self._config.reach_m * min(steps, BACK), heading, sd)
-        compass = all(self._sights[k].scan.has_compass for k in (base, i))
         return agreed(prior, self._strides.cloud(self._sights, base, i, at) if compass else None)
 
     def _heading(self, i: int, base: int) -> tuple[float, float]:
