@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,17 +54,22 @@ def _closer(way: Way, nearest: dict[int, float]) -> float:
     return sum(math.log(gap / max(min(nearest[end], gap), 0.5)) for end in (way.first, way.second) if end >= 0)
 
 
-def candidate(way: Way, scene: Scene, closer: float) -> Candidate:
-    """Make a way a candidate; ``closer`` tells how near other partners of its ends are."""
+def judged(ways: Sequence[Way], scene: Scene, closer: Sequence[float]) -> list[Candidate]:
+    """Make ways candidates; ``closer`` tells of each how near other partners of its ends are."""
+    told = features(ways, scene, closer)
+    return [_candidate(way, each) for way, each in zip(ways, told, strict=True)]
+
+
+def _candidate(way: Way, told: NDArray[np.float64]) -> Candidate:
     a, b = way.ends
     return Candidate(
         first=way.first,
         second=way.second,
         curve=way.curve.name,
         path=way.path,
-        cells=frozenset((row, col) for row, col in way.path.tolist()),
+        cells=frozenset(map(tuple, way.path.tolist())),
         gap=way.chord.gap,
-        features=features(way, scene, closer),
+        features=told,
         half_a=a.half,
         half_b=b.half,
         start=(a.x, a.y),

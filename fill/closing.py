@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
 from typing import Final
 
 import numpy as np
@@ -16,14 +15,13 @@ from fill.candidates import Candidate
 from fill.freedom import capped
 from fill.logistic import Logistic
 from fill.matching import asked, assign, candidates, gain
-from fill.memory import Box, Memory, content
+from fill.memory import Memory
 from fill.segments import EIGHT, End, Walls
 from mapping.values import OCCUPIED, UNKNOWN
 
 THRESHOLD: Final = 0.25
 """A fill less likely right than this is not drawn: the end stays open."""
 _MOST_ENDS: Final = 1500
-CAP: Final = 6  # cells before an end that tell whether it was seen to be the end
 _SMALL: Final = 12.0  # cells: gaps that are closed before any larger one is looked at
 
 
@@ -71,9 +69,7 @@ def open_walls(wall: NDArray[np.bool_], state: NDArray[np.uint8], memory: Memory
     """Find the walls, and of their ends those that were not seen to be the end."""
     memory = memory or Memory()
     walls = memory.walls(wall, state)
-
-    capped_there = (memory.recall(("capped", content(end)), partial(_capped, end, state)) for end in walls.ends)
-    ends = (end for end, shut in zip(walls.ends, capped_there, strict=True) if not shut)
+    ends = (end for end, shut in zip(walls.ends, capped(walls.ends, state).tolist(), strict=True) if not shut)
     return dataclasses.replace(walls, ends=_longest(tuple(ends)))
 
 
@@ -83,11 +79,6 @@ def _longest(ends: tuple[End, ...]) -> tuple[End, ...]:
         return ends
     kept = sorted(range(len(ends)), key=lambda index: (-ends[index].length, index))[:_MOST_ENDS]
     return tuple(ends[index] for index in sorted(kept))
-
-
-def _capped(end: End, state: NDArray[np.uint8]) -> tuple[Box, bool]:
-    row, col = round(end.y), round(end.x)
-    return (row - CAP, col - CAP, row + CAP + 1, col + CAP + 1), capped(end, state)
 
 
 def _close_round(

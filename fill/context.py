@@ -1,22 +1,23 @@
 """What tells whether a way closes a hole rightly: its shape, what was seen beside it, and how its walls end.
 
-Nothing here knows left from right or the first end from the second, so that a mirrored map is judged the same.
+Nothing here knows left from right or the first end from the second, so that a mirrored map is judged the same.  Ways
+are judged many at a time, and what is told of one does not hang on which others are among them.
 """
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fill.freedom import at, face
+from fill.beside import NEAREST, PLACES, Beside, look_beside
+from fill.freedom import faces
 from fill.scene import FARTHEST, Scene
-from fill.segments import End
 from fill.ways import Way
-from mapping.values import FREE, OCCUPIED, UNKNOWN
+from mapping.values import FREE, OCCUPIED
 
 _BETWEEN: Final = ("water both", "log gap", "log water", "near reach", "near bulge", "snug both", "tips flanked")
 FEATURES: Final = (
@@ -33,12 +34,8 @@ FEATURES: Final = (
 )  # fmt: skip
 """What a candidate is judged by, in this order."""
 
-_PLACES: Final = 12  # along a way that are looked from
-_MIDDLE: Final = slice(1, _PLACES - 1)
-_BEHIND: Final = (2, 4, 7)  # cells behind an end: what its wall has at its sides
-_OFF: Final = np.arange(1.0, FARTHEST + 1.0)
+_MIDDLE: Final = slice(1, PLACES - 1)
 _SEEN: Final = slice(1, 7)  # cells off the face that are near
-_DENSE: Final = 4  # cells of water in a row that are water and not a stray ray
 _REACH: Final = 0.6  # of the gap: so far to its sides water is looked for
 _CLOSE: Final = 5
 _PASSABLE: Final = 4.0  # cells; narrower gaps are no passage
@@ -46,27 +43,49 @@ _WET: Final = 0.35
 _BOWS: Final = 6
 _LEAVING: Final = 16  # steps of a quarter cell over which a way leaves its wall
 _BEYOND_SIGHT: Final = 28.0  # cells: length of a wall that is followed no further
+_MOST: Final = 256  # ways judged at a time
+
+Layer = NDArray[np.float64]
+Told = dict[str, Layer]
 
 
 @dataclass(frozen=True, slots=True)
-class Beside:
-    """What is seen from places along a way and its walls, square to it, over ``FARTHEST`` cells off the face.
+class _Ways:
+    """Ways as columns ``(n,)``: ``a``, ``b`` for either end, ``side`` where the second is the side of a wall.
 
-    ``seen`` ``(2, n, cells)`` uint8; ``away`` ``(2, n)`` cells to the first that is not unknown; ``water`` and ``wall``
-    ``(2, n)`` bool tell what that is.  The first ``_PLACES`` lie on the way, then three behind either end.
+    The curve of each runs along ``points`` ``(m, 2)`` from ``first`` to ``last``.
     """
 
-    seen: NDArray[np.uint8]
-    away: NDArray[np.int64]
-    water: NDArray[np.bool_]
-    wall: NDArray[np.bool_]
+    side: NDArray[np.bool_]
+    points: Layer
+    first: NDArray[np.int64]
+    last: NDArray[np.int64]
+    gap: Layer
+    bend_a: Layer
+    bend_b: Layer
+    turn: Layer
+    half_a: Layer
+    half_b: Layer
+    length_a: Layer
+    length_b: Layer
+    wander_a: Layer
+    wander_b: Layer
+    bow: Layer
 
 
-def features(way: Way, scene: Scene, closer: float) -> NDArray[np.float64]:
-    """Features ``(k,)`` after ``FEATURES``; ``closer`` is how much nearer other partners of its ends are."""
-    beside = _beside(way, scene.state)
-    found = _shape(way) | _banks(way, beside) | _jambs(way, beside, scene.state) | _under(way, scene)
-    found["one"] = 1.0
+def features(ways: Sequence[Way], scene: Scene, closer: Sequence[float]) -> Layer:
+    """Features ``(n, k)`` after ``FEATURES``; ``closer`` is how much nearer other partners of a way's ends are."""
+    parts = [slice(start, start + _MOST) for start in range(0, len(ways), _MOST)]
+    told = [_features(ways[part], scene, np.array(closer[part])) for part in parts]
+    return np.concatenate([np.zeros((0, len(FEATURES))), *told])
+
+
+def _features(ways: Sequence[Way], scene: Scene, closer: Layer) -> Layer:
+    columns = _columns(ways)
+    beside = look_beside(ways, columns.points, columns.first, columns.last, scene.state)
+    found = _shape(ways, columns) | _banks(columns.gap, beside)
+    found |= _jambs(ways, columns.side, beside, scene.state) | _under(ways, scene)
+    found["one"] = np.ones(len(ways))
     found["closer partners"] = closer
     found["water both, divides"] = found["water both"] * found["divides"]
     found["near both, divides"] = found["near both"] * found["divides"]
@@ -75,144 +94,145 @@ def features(way: Way, scene: Scene, closer: float) -> NDArray[np.float64]:
     found["bent x turn"] = found["bent"] * found["turn"]
     found["corner x turn"] = found["corner"] * found["turn"]
     found["turn x log gap"] = found["turn"] * found["log gap"]
-    passage = float(found["water both"] > _WET and way.chord.gap > _PASSABLE)
+    passage = ((found["water both"] > _WET) & (columns.gap > _PASSABLE)).astype(np.float64)
     found["passage"] = passage
     found |= {f"passage: {name}": passage * found[name] for name in _BETWEEN}
-    return np.array([found[name] for name in FEATURES])
+    return np.stack([found[name] for name in FEATURES], axis=1)
 
 
-def _shape(way: Way) -> dict[str, float]:
+def _columns(ways: Sequence[Way]) -> _Ways:
+    rows = []
+    for way in ways:
+        (a, b), to = way.ends, way.chord
+        rows.append(
+            (to.gap, to.bend_a, to.bend_b, to.turn, a.half, b.half, a.length, b.length, a.wander, b.wander, way.bow)
+        )
+    points = np.concatenate([way.curve.points for way in ways])
+    behind = np.cumsum([len(way.curve.points) for way in ways])
+    first = np.concatenate([[0], behind[:-1]])
+    side = np.array([way.second < 0 for way in ways])
+    return _Ways(side, points, first, behind - 1, *np.array(rows, np.float64).T.copy())
+
+
+def _shape(ways: Sequence[Way], of: _Ways) -> Told:
     """How the ends lie to each other, and how the way runs between them."""
-    (a, b), side = way.ends, way.second < 0
-    gap = max(way.chord.gap, 1.0)
-    doubt = math.atan(1.0 / gap)  # a cell of stairs turns a short chord by this much
-    bends = sorted((way.chord.bend_a, way.chord.bend_a if side else way.chord.bend_b))
-    less, bend = bends if side else [max(0.0, each - doubt) for each in bends]
-    lengths = sorted((a.length, max(a.length, _BEYOND_SIGHT) if side else b.length))
-    length = 0.25 * len(way.curve.points)
-    lesser_kink, kink = _kinks(way)
+    gap = np.maximum(of.gap, 1.0)
+    doubt = np.where(of.side, 0.0, np.arctan(1.0 / gap))  # a cell of stairs turns a short chord by this much
+    less, bend = _ranked(of.bend_a, np.where(of.side, of.bend_a, of.bend_b))
+    less, bend = np.maximum(less - doubt, 0.0), np.maximum(bend - doubt, 0.0)
+    lengths = _ranked(of.length_a, np.where(of.side, np.maximum(of.length_a, _BEYOND_SIGHT), of.length_b))
+    length = 0.25 * (of.last - of.first + 1)
+    lesser_kink, kink = _kinks(ways, of)
+    kinds = np.array([way.curve.name for way in ways])
     return {
-        "log gap": math.log(gap),
+        "log gap": np.log(gap),
         "short": 1.0 / gap,
         "bend": bend,
         "lesser bend": less,
-        "turn": 0.0 if side else max(0.0, way.chord.turn - doubt),
-        "offset": math.log1p(gap * math.sin(min(bend, math.pi / 2))),
-        "lesser offset": math.log1p(gap * math.sin(min(less, math.pi / 2))),
+        "turn": np.where(of.side, 0.0, np.maximum(of.turn - doubt, 0.0)),
+        "offset": np.log1p(gap * np.sin(np.minimum(bend, np.pi / 2))),
+        "lesser offset": np.log1p(gap * np.sin(np.minimum(less, np.pi / 2))),
         "kink": kink,
         "lesser kink": lesser_kink,
-        "half": math.log1p((a.half + b.half) / 2.0),
-        "uneven": 0.0 if side else abs(a.half - b.half),
-        "log support": math.log(lengths[0]),
-        "log longer support": math.log(lengths[1]),
-        "wander": max(a.wander, 0.0 if side else b.wander),
-        "detour": math.log(max(length, 1.0) / gap),
-        "bent": float(way.curve.name in ("quadratic", "cubic")),
-        "bow": min(way.bow, _BOWS) / 2.0,
-    } | {name: float(way.curve.name == name) for name in ("tangent", "corner", "channel", "shore", "side")}
+        "half": np.log1p((of.half_a + of.half_b) / 2.0),
+        "uneven": np.where(of.side, 0.0, np.abs(of.half_a - of.half_b)),
+        "log support": np.log(lengths[0]),
+        "log longer support": np.log(lengths[1]),
+        "wander": np.maximum(of.wander_a, np.where(of.side, 0.0, of.wander_b)),
+        "detour": np.log(np.maximum(length, 1.0) / gap),
+        "bent": ((kinds == "quadratic") | (kinds == "cubic")).astype(np.float64),
+        "bow": np.minimum(of.bow, _BOWS) / 2.0,
+    } | {name: (kinds == name).astype(np.float64) for name in ("tangent", "corner", "channel", "shore", "side")}
 
 
-def _kinks(way: Way) -> list[float]:
+def _kinks(ways: Sequence[Way], of: _Ways) -> tuple[Layer, Layer]:
     """Angles between the walls and the way where it leaves them, the lesser first; a cell of stairs is forgiven."""
-    points = way.curve.points
-    run = min(_LEAVING, len(points) - 1)
-    (a, b), out, back = way.ends, points[run] - points[0], points[-1 - run] - points[-1]
-    doubt = math.atan(1.0 / max(0.25 * run, 1.0))
-    kinks = [_angle((a.dx, a.dy), out)] + ([_angle((b.dx, b.dy), back)] if way.second >= 0 else [])
-    return sorted(max(0.0, kink - doubt) for kink in (kinks if len(kinks) > 1 else kinks * 2))
+    run = np.minimum(_LEAVING, of.last - of.first)
+    out = of.points[of.first + run] - of.points[of.first]
+    back = of.points[of.last - run] - of.points[of.last]
+    doubt = np.arctan(1.0 / np.maximum(0.25 * run, 1.0))
+    aims = np.array([[(end.dx, end.dy) for end in way.ends] for way in ways])
+    one, other = _angle(aims[:, 0], out), _angle(aims[:, 1], back)
+    less, more = _ranked(one, np.where(of.side, one, other))
+    return np.maximum(less - doubt, 0.0), np.maximum(more - doubt, 0.0)
 
 
-def _angle(aim: tuple[float, float], way: NDArray[np.float64]) -> float:
-    """Angle between two directions, 0 to pi."""
-    return abs(math.atan2(aim[0] * way[1] - aim[1] * way[0], aim[0] * way[0] + aim[1] * way[1]))
+def _ranked(one: Layer, other: Layer) -> tuple[Layer, Layer]:
+    return np.minimum(one, other), np.maximum(one, other)
 
 
-def _beside(way: Way, state: NDArray[np.uint8]) -> Beside:
-    points = way.curve.points
-    places = points[np.linspace(0, len(points) - 1, _PLACES).astype(np.int64)]
-    ahead = np.gradient(places, axis=0)
-    a, b = way.ends
-    met = places[-1:].repeat(len(_BEHIND), axis=0), ahead[-1:].repeat(len(_BEHIND), axis=0)
-    walls = _behind(a, 1.0), _behind(b, -1.0) if way.second >= 0 else met
-    places = np.concatenate([places, walls[0][0], walls[1][0]])
-    ahead = np.concatenate([ahead, walls[0][1], walls[1][1]])
-    ahead /= np.maximum(np.hypot(ahead[:, 0], ahead[:, 1]), 1e-9)[:, None]
-    off = _OFF + max((a.half + b.half) / 2.0 - 0.5, 0.0)
-    lateral = np.array([1.0, -1.0])[:, None, None] * off
-    seen = at(state, places[:, 0, None] - lateral * ahead[:, 1, None], places[:, 1, None] + lateral * ahead[:, 0, None])
-    known = seen != UNKNOWN
-    away = np.where(known.any(axis=2), known.argmax(axis=2), len(_OFF))
-    nearest = np.minimum(away[:, :, None] + np.arange(_DENSE), len(_OFF) - 1)
-    run = np.take_along_axis(seen, nearest, axis=2)
-    water = (run[:, :, 0] == FREE) & (np.mean(run == FREE, axis=2) > 0.6)
-    return Beside(seen, away, water, run[:, :, 0] == OCCUPIED)
+def _angle(aim: Layer, way: Layer) -> Layer:
+    """Angles ``(n,)`` between directions ``(n, 2)``, 0 to pi."""
+    across = aim[:, 0] * way[:, 1] - aim[:, 1] * way[:, 0]
+    return np.abs(np.arctan2(across, aim[:, 0] * way[:, 0] + aim[:, 1] * way[:, 1]))
 
 
-def _behind(end: End, sign: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Places on the wall behind an end, and its direction there."""
-    places = end.line[np.minimum(_BEHIND, len(end.line) - 1)]
-    return places, np.repeat([[end.dx * sign, end.dy * sign]], len(_BEHIND), axis=0)
-
-
-def _banks(way: Way, beside: Beside) -> dict[str, float]:
+def _banks(gap: Layer, beside: Beside) -> Told:
     """Tell what lies on either side of a way: water, how near, and whether its edge runs along the way or bulges."""
-    gap = max(way.chord.gap, 1.0)
-    reach = beside.away[:, _MIDDLE] <= _REACH * gap + 4.0
-    water = beside.water[:, _MIDDLE] & reach
-    off = np.log1p(np.where(beside.water, beside.away, int(FARTHEST)))[:, _MIDDLE]
-    near, far = off[np.argsort(off.mean(axis=1), kind="stable")]
-    share = np.mean(beside.seen[:, _MIDDLE, _SEEN] == FREE, axis=2)
-    snug = np.mean(beside.seen[:, _MIDDLE, :2] == FREE, axis=2)
-    wall = beside.wall[:, _MIDDLE]
-    radius = math.log1p(gap / 2.0)
+    gap = np.maximum(gap, 1.0)
+    away, wall = beside.away[:, :, _MIDDLE], beside.wall[:, :, _MIDDLE]
+    reach = away <= (_REACH * gap + 4.0)[:, None, None]
+    water = beside.water[:, :, _MIDDLE] & reach
+    off = np.log1p(np.where(beside.water, beside.away, int(FARTHEST)))[:, :, _MIDDLE]
+    mean = off.mean(axis=2)
+    swapped = (mean[:, 1] < mean[:, 0])[:, None]
+    near, far = np.where(swapped, off[:, 1], off[:, 0]), np.where(swapped, off[:, 0], off[:, 1])
+    share = np.mean(beside.seen[:, :, _MIDDLE, _SEEN] == FREE, axis=3)
+    snug = np.mean(beside.seen[:, :, _MIDDLE, :2] == FREE, axis=3)
+    radius = np.log1p(gap / 2.0)
     return {
-        "near both": float(share.min(axis=0).mean()),
-        "near one": float(np.abs(share[0] - share[1]).mean()),
-        "water both": float(np.mean(water[0] & water[1])),
-        "snug both": float(snug.min(axis=0).mean()),
-        "snug any": float(snug.max(axis=0).mean()),
-        "near water": float(near.mean()),
-        "far water": float(far.mean()),
-        "near ragged": float(near.std()),
-        "far ragged": float(far.std()),
+        "near both": share.min(axis=1).mean(axis=1),
+        "near one": np.abs(share[:, 0] - share[:, 1]).mean(axis=1),
+        "water both": np.mean(water[:, 0] & water[:, 1], axis=1),
+        "snug both": snug.min(axis=1).mean(axis=1),
+        "snug any": snug.max(axis=1).mean(axis=1),
+        "near water": near.mean(axis=1),
+        "far water": far.mean(axis=1),
+        "near ragged": near.std(axis=1),
+        "far ragged": far.std(axis=1),
         "near bulge": _bulge(near),
         "far bulge": _bulge(far),
-        "near reach": float(near[3:7].mean()) - radius,
-        "far reach": float(far[3:7].mean()) - radius,
-        "wall beyond": float(np.any(wall & reach, axis=0).mean()),
-        "wall close": float(np.any(wall & (beside.away[:, _MIDDLE] <= _CLOSE), axis=0).mean()),
+        "near reach": near[:, 3:7].mean(axis=1) - radius,
+        "far reach": far[:, 3:7].mean(axis=1) - radius,
+        "wall beyond": np.any(wall & reach, axis=1).mean(axis=1),
+        "wall close": np.any(wall & (away <= _CLOSE), axis=1).mean(axis=1),
     }
 
 
-def _bulge(off: NDArray[np.float64]) -> float:
+def _bulge(off: Layer) -> Layer:
     """How much further water is from the middle of a way than from its ends."""
-    return float(off[3:7].mean() - off[[0, 1, -2, -1]].mean())
+    return np.asarray(off[:, 3:7].mean(axis=1) - off[:, [0, 1, -2, -1]].mean(axis=1), np.float64)
 
 
-def _jambs(way: Way, beside: Beside, state: NDArray[np.uint8]) -> dict[str, float]:
+def _jambs(ways: Sequence[Way], side: NDArray[np.bool_], beside: Beside, state: NDArray[np.uint8]) -> Told:
     """How the walls end: with water along their sides to the tip, with water before their face, or in the unknown."""
-    behind = slice(_PLACES, None)
-    flank = np.any(beside.seen[:, behind, :3] == FREE, axis=2)
-    both, one = flank[0] & flank[1], flank[0] | flank[1]
-    tips, deep = [0, len(_BEHIND)], [len(_BEHIND) - 1, 2 * len(_BEHIND) - 1]
-    faces = [face(end, state) for end in (way.ends if way.second >= 0 else way.ends[:1])]
+    behind = beside.seen[:, :, PLACES:]
+    flank = np.any(behind[..., :3] == FREE, axis=3)
+    both, one = flank[:, 0] & flank[:, 1], flank[:, 0] | flank[:, 1]
+    tips, deep = [0, NEAREST], [NEAREST - 1, 2 * NEAREST - 1]
+    freer = faces([end for way in ways for end in way.ends], state).reshape(-1, 2)
+    other = np.where(side, freer[:, 0], freer[:, 1])
     return {
-        "divides": float(np.mean(beside.seen[:, behind, _SEEN] == FREE, axis=2).min(axis=0).mean()),
-        "tips flanked": float(both[tips].mean()),
-        "walls flanked": float(both[deep].mean()),
-        "tips half flanked": float(one[tips].mean()),
-        "walls half flanked": float(one[deep].mean()),
-        "faces": sum(faces) / len(faces),
-        "freer face": max(faces),
+        "divides": np.mean(behind[..., _SEEN] == FREE, axis=3).min(axis=1).mean(axis=1),
+        "tips flanked": both[:, tips].mean(axis=1),
+        "walls flanked": both[:, deep].mean(axis=1),
+        "tips half flanked": one[:, tips].mean(axis=1),
+        "walls half flanked": one[:, deep].mean(axis=1),
+        "faces": (freer[:, 0] + other) / 2.0,
+        "freer face": np.maximum(freer[:, 0], other),
     }
 
 
-def _under(way: Way, scene: Scene) -> dict[str, float]:
-    """Tell what the way itself passes."""
-    rows, cols = way.path.T
+def _under(ways: Sequence[Way], scene: Scene) -> Told:
+    """Tell what the ways themselves pass."""
+    rows, cols = np.concatenate([way.path for way in ways]).T
+    count = np.array([len(way.path) for way in ways])
+    first = np.cumsum(count) - count
     water = np.log(np.maximum(scene.water[rows, cols], 0.5))
+    mean = np.add.reduceat(water, first) / count
+    off = water - np.repeat(mean, count)
     return {
-        "specks": float(np.mean(scene.state[rows, cols] == OCCUPIED)),
-        "log water": float(water.mean()),
-        "water ragged": float(water.std()),
+        "specks": np.add.reduceat((scene.state[rows, cols] == OCCUPIED).astype(np.float64), first) / count,
+        "log water": mean,
+        "water ragged": np.sqrt(np.add.reduceat(off * off, first) / count),
     }

@@ -7,6 +7,7 @@ crossed, nor slipped through between two free cells that touch at a corner.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -53,16 +54,16 @@ _FAN: Final = np.array(
 ).T  # fmt: skip
 
 
-def face(end: End, state: NDArray[np.uint8]) -> float:
-    """Share of free water close before and beside the face of an end."""
-    return float(np.mean(_before(end, state) == FREE))
+def faces(ends: Sequence[End], state: NDArray[np.uint8]) -> NDArray[np.float64]:
+    """Share ``(n,)`` of free water close before and beside the face of each end."""
+    return np.asarray(np.mean(_before(ends, state) == FREE, axis=1), np.float64)
 
 
-def capped(end: End, state: NDArray[np.uint8]) -> bool:
-    """Whether the wall was seen to end: nothing unknown lies close before its end face."""
-    return not bool(np.any(_before(end, state) == UNKNOWN))
+def capped(ends: Sequence[End], state: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    """Whether each wall ``(n,)`` was seen to end: nothing unknown lies close before its end face."""
+    return np.logical_not(np.any(_before(ends, state) == UNKNOWN, axis=1))
 
 
-def _before(end: End, state: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    x, y = end.x + _FAN[0] * end.dx - _FAN[1] * end.dy, end.y + _FAN[0] * end.dy + _FAN[1] * end.dx
-    return at(state, x, y)
+def _before(ends: Sequence[End], state: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    x, y, dx, dy = np.array([(end.x, end.y, end.dx, end.dy) for end in ends]).reshape(-1, 4, 1).transpose(1, 0, 2)
+    return at(state, x + _FAN[0] * dx - _FAN[1] * dy, y + _FAN[0] * dy + _FAN[1] * dx)

@@ -35,8 +35,7 @@ def candidates(walls: Walls, state: NDArray[np.uint8], longest: float, memory: M
     scene = look(walls, state, memory.water(state))
     ways = [way for first, second in _pairs(walls, longest) for way in ways_across(first, second, scene, memory)]
     ways += [way for index in range(len(walls.ends)) for way in ways_onto_sides(index, scene, longest, memory)]
-    closer = closer_partners(ways)
-    return [recalled(way, each, scene, memory) for way, each in zip(ways, closer, strict=True)]
+    return recalled(ways, closer_partners(ways), scene, memory)
 
 
 def assign(found: Sequence[Candidate], gains: Sequence[float]) -> list[int]:

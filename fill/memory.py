@@ -12,7 +12,7 @@ same round of the last pass, and in the round before of this one.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
 from typing import Final, TypeVar
 
@@ -149,19 +149,31 @@ class Memory:
 
     def recall(self, key: Hashable, make: Callable[[], tuple[Box, T]]) -> T:
         """Return what ``make`` would, which tells the box of cells that it looked at; what else it needs is ``key``."""
+        return self.recall_all([key], lambda _: [make()])[0]
+
+    def recall_all(self, keys: Sequence[Hashable], make: Callable[[list[int]], list[tuple[Box, T]]]) -> list[T]:
+        """Return for each key what ``make`` would, which is given the places among ``keys`` of those not known."""
         if not self._now:
-            return make()[1]
+            return [made for _, made in make(list(range(len(keys))))]
         results = self._now[-1].results
-        if key in results:
-            return results[key][1]  # type: ignore[return-value]
+        fresh = {}
+        for place, key in enumerate(keys):
+            if key not in results and key not in fresh:
+                known = self._known_before(key)
+                if known is None:
+                    fresh[key] = place
+                else:
+                    results[key] = known
+        results.update(zip(fresh, make(list(fresh.values())) if fresh else (), strict=True))
+        return [results[key][1] for key in keys]  # type: ignore[misc]
+
+    def _known_before(self, key: Hashable) -> tuple[Box, object] | None:
+        """Return an earlier round's result that still holds."""
         for before, clean in zip(self._before, self._clean, strict=True):
             known = before.results.get(key)
             if known is not None and clean(known[0]):
-                results[key] = known
-                return known[1]  # type: ignore[return-value]
-        box, made = make()
-        results[key] = (box, made)
-        return made
+                return known
+        return None
 
     def _found(self, mask: NDArray[np.bool_]) -> dict[int, _Wall]:
         label = np.zeros(mask.shape, np.int32)

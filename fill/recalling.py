@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Hashable, Sequence
 from functools import partial
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fill.candidates import Candidate, candidate
+from fill.candidates import Candidate, judged
 from fill.memory import Box, Memory, content
 from fill.scene import FARTHEST, Scene
 from fill.ways import Way, across, curves_between, onto_sides
@@ -33,15 +34,32 @@ def ways_onto_sides(index: int, scene: Scene, longest: float, memory: Memory) ->
     return [_numbered(way, index, -1) for way in memory.recall(key, partial(_onto_sides, index, scene, longest))]
 
 
-def recalled(way: Way, closer: float, scene: Scene, memory: Memory) -> Candidate:
-    """Make a way a candidate."""
+def recalled(ways: Sequence[Way], closer: Sequence[float], scene: Scene, memory: Memory) -> list[Candidate]:
+    """Make ways candidates."""
+
+    def made(places: list[int]) -> list[tuple[Box, Candidate]]:
+        chosen = [ways[place] for place in places]
+        found = judged(chosen, scene, [closer[place] for place in places])
+        return [(_judged_from(way), each) for way, each in zip(chosen, found, strict=True)]
+
+    found = memory.recall_all([_key(way, each) for way, each in zip(ways, closer, strict=True)], made)
+    return [
+        each
+        if (each.first, each.second) == (way.first, way.second)
+        else dataclasses.replace(each, first=way.first, second=way.second)
+        for way, each in zip(ways, found, strict=True)
+    ]
+
+
+def _key(way: Way, closer: float) -> Hashable:
     a, b = way.ends
     shape = way.curve.name, way.curve.points.tobytes(), way.path.tobytes(), way.bow
-    key = ("candidate", *content(a), *content(b), way.second < 0, *shape, closer)
-    found = memory.recall(key, partial(_candidate, way, closer, scene))
-    if (found.first, found.second) == (way.first, way.second):
-        return found
-    return dataclasses.replace(found, first=way.first, second=way.second)
+    return "candidate", *content(a), *content(b), way.second < 0, *shape, closer
+
+
+def _judged_from(way: Way) -> Box:
+    places = np.concatenate([way.curve.points, *(end.line[:8] for end in way.ends)])
+    return _box(places, FARTHEST + max(end.half for end in way.ends) + _FACE)
 
 
 def _across(first: int, second: int, scene: Scene) -> tuple[Box, list[Way]]:
@@ -58,11 +76,6 @@ def _across(first: int, second: int, scene: Scene) -> tuple[Box, list[Way]]:
 def _onto_sides(index: int, scene: Scene, longest: float) -> tuple[Box, list[Way]]:
     found, looked = onto_sides(index, scene, longest)
     return _box(looked, 2.0), found
-
-
-def _candidate(way: Way, closer: float, scene: Scene) -> tuple[Box, Candidate]:
-    places = np.concatenate([way.curve.points, *(end.line[:8] for end in way.ends)])
-    return _box(places, FARTHEST + max(end.half for end in way.ends) + _FACE), candidate(way, scene, closer)
 
 
 def _box(places: NDArray[np.float64], margin: float) -> Box:
