@@ -61,7 +61,7 @@ def faces(ends: Sequence[End], state: NDArray[np.uint8]) -> NDArray[np.float64]:
 
 def capped(ends: Sequence[End], state: NDArray[np.uint8]) -> NDArray[np.bool_]:
     """Whether each wall ``(n,)`` was seen to end: nothing unknown lies close before its end face."""
-    return np.logical_not(np.any(_before(ends, state) == UNKNOWN, axis=1))
+    return np.asarray(np.all(_before(ends, state) != UNKNOWN, axis=1), np.bool_)
 
 
 def _before(ends: Sequence[End], state: NDArray[np.uint8]) -> NDArray[np.uint8]:
