@@ -67,7 +67,7 @@ def _looks(
     steps[:, -1] = last - first
     places = points[first[:, None] + steps]
     ahead = np.gradient(places, axis=1)
-    side = np.array([way.second < 0 for way in ways])[:, None, None]
+    side = np.array([way.side for way in ways])[:, None, None]
     near = _behind([way.ends[0] for way in ways], 1.0)
     beyond = _behind([way.ends[1] for way in ways], -1.0)
     met = places[:, -1:], ahead[:, -1:]

@@ -16,9 +16,9 @@ from fill.segments import End
 from fill.ways import Way
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Candidate:
-    """A way to close a hole between ends ``first`` and ``second`` (-1: the side of a wall).
+    """A way to close a hole between two ``ends``, or, if it is a ``side``, an end and the side of a wall.
 
     ``path`` ``(n, 2)`` int32 of row and column, joined edge to edge from inside the one wall to inside the other;
     ``cells`` the same as a set; ``features`` after ``FEATURES``; ``half_a``, ``half_b`` half the thickness at either
@@ -26,8 +26,6 @@ class Candidate:
     met on its side the place that is met.
     """
 
-    first: int
-    second: int
     curve: str
     path: NDArray[np.int32]
     cells: frozenset[tuple[int, int]]
@@ -38,20 +36,26 @@ class Candidate:
     start: tuple[float, float]
     finish: tuple[float, float]
     ends: tuple[End, End]
+    side: bool
+
+    @property
+    def joined(self) -> tuple[End, ...]:
+        """The true ends that it joins: no other candidate can have them too."""
+        return self.ends[:1] if self.side else self.ends
 
 
-def closer_partners(ways: list[Way]) -> list[float]:
+def closer_partners(ways: Sequence[Way]) -> list[float]:
     """Return for each way how much nearer than its own the nearest partners of its ends are: logarithms, summed."""
-    nearest: dict[int, float] = {}
+    nearest: dict[End, float] = {}
     for way in ways:
-        for end in (way.first, way.second):
+        for end in way.joined:
             nearest[end] = min(way.chord.gap, nearest.get(end, math.inf))
     return [_closer(way, nearest) for way in ways]
 
 
-def _closer(way: Way, nearest: dict[int, float]) -> float:
+def _closer(way: Way, nearest: dict[End, float]) -> float:
     gap = max(way.chord.gap, 1.0)
-    return sum(math.log(gap / max(min(nearest[end], gap), 0.5)) for end in (way.first, way.second) if end >= 0)
+    return sum(math.log(gap / max(min(nearest[end], gap), 0.5)) for end in way.joined)
 
 
 def judged(ways: Sequence[Way], scene: Scene, closer: Sequence[float]) -> list[Candidate]:
@@ -63,8 +67,6 @@ def judged(ways: Sequence[Way], scene: Scene, closer: Sequence[float]) -> list[C
 def _candidate(way: Way, told: NDArray[np.float64]) -> Candidate:
     a, b = way.ends
     return Candidate(
-        first=way.first,
-        second=way.second,
         curve=way.curve.name,
         path=way.path,
         cells=frozenset(map(tuple, way.path.tolist())),
@@ -75,4 +77,5 @@ def _candidate(way: Way, told: NDArray[np.float64]) -> Candidate:
         start=(a.x, a.y),
         finish=(b.x, b.y),
         ends=way.ends,
+        side=way.side,
     )

@@ -36,7 +36,7 @@ def channels(a: End, b: End, scene: Scene) -> list[Curve]:
     gap = math.hypot(b.x - a.x, b.y - a.y)
     if gap < _SHORTEST:
         return []
-    low, high = _window(a, b, gap, scene.state.shape)
+    low, high = window(a, b, gap, scene.state.shape)
     water = scene.water[low[0] : high[0], low[1] : high[1]]
     depth = (a.half + b.half) / 2.0 + 1.0
     shore = 1.0 + _OFF * np.minimum(np.abs(water - depth), _MOST)
@@ -49,7 +49,7 @@ def channels(a: End, b: End, scene: Scene) -> list[Curve]:
     return found
 
 
-def _window(a: End, b: End, gap: float, shape: tuple[int, ...]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def window(a: End, b: End, gap: float, shape: tuple[int, ...]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """First and last row and column between which a way is looked for."""
     margin = int(_ASIDE * gap) + _BEYOND
     low = np.array([int(min(a.y, b.y)) - margin, int(min(a.x, b.x)) - margin])

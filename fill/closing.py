@@ -99,21 +99,20 @@ def _close_round(
     return closed
 
 
-def _by_end(found: list[Candidate]) -> dict[int, list[int]]:
+def _by_end(found: list[Candidate]) -> dict[End, list[int]]:
     """Return for each end the candidates that it has."""
-    indices: dict[int, list[int]] = {}
+    indices: dict[End, list[int]] = {}
     for index, each in enumerate(found):
-        for end in {each.first, each.second} - {-1}:
+        for end in each.joined:
             indices.setdefault(end, []).append(index)
     return indices
 
 
 def _rivals(
-    taken: int, found: list[Candidate], by_end: dict[int, list[int]], chances: NDArray[np.float64]
+    taken: int, found: list[Candidate], by_end: dict[End, list[int]], chances: NDArray[np.float64]
 ) -> tuple[tuple[Candidate, float], ...]:
     """Return the other candidates of the same ends, with their chances."""
-    ends = {found[taken].first, found[taken].second} - {-1}
-    shared = sorted({index for end in ends for index in by_end[end]} - {taken})
+    shared = sorted({index for end in found[taken].joined for index in by_end[end]} - {taken})
     return tuple((found[index], float(chances[index])) for index in shared)
 
 

@@ -110,7 +110,7 @@ def _columns(ways: Sequence[Way]) -> _Ways:
     points = np.concatenate([way.curve.points for way in ways])
     behind = np.cumsum([len(way.curve.points) for way in ways])
     first = np.concatenate([[0], behind[:-1]])
-    side = np.array([way.second < 0 for way in ways])
+    side = np.array([way.side for way in ways])
     return _Ways(side, points, first, behind - 1, *np.array(rows, np.float64).T.copy())
 
 

@@ -13,9 +13,10 @@ from fill.certainty import Belief
 from fill.closing import close_holes, open_ends
 from fill.knockout import places, window
 from fill.lessons import hold, taught
-from fill.memory import Memory, Recent
+from fill.memory import Memory
 from fill.paper import paper_fill
 from fill.prior import prior
+from fill.recent import Recent
 from fill.telling import heard, tell
 from fill.values import Filled, Hole
 from mapping.values import Grid

@@ -19,7 +19,7 @@ from fill.candidates import FEATURES, Candidate, closer_partners
 from fill.memory import Memory
 from fill.recalling import recalled, ways_across, ways_onto_sides
 from fill.scene import look
-from fill.segments import Walls
+from fill.segments import End, Walls
 
 _PARTNERS: Final = 8  # candidates of an end that are worth drawing
 _WATER_BOTH: Final = FEATURES.index("water both")
@@ -33,8 +33,9 @@ def candidates(walls: Walls, state: NDArray[np.uint8], longest: float, memory: M
     """Every way to close a hole of up to ``longest`` cells that no free water forbids."""
     memory = memory or Memory()
     scene = look(walls, state, memory.water(state))
-    ways = [way for first, second in _pairs(walls, longest) for way in ways_across(first, second, scene, memory)]
-    ways += [way for index in range(len(walls.ends)) for way in ways_onto_sides(index, scene, longest, memory)]
+    ends = walls.ends
+    ways = [way for a, b in _pairs(walls, longest) for way in ways_across(ends[a], ends[b], scene, memory)]
+    ways += [way for end in ends for way in ways_onto_sides(end, scene, longest, memory)]
     return recalled(ways, closer_partners(ways), scene, memory)
 
 
@@ -84,10 +85,11 @@ def _pairs(walls: Walls, longest: float) -> list[tuple[int, int]]:
 
 def _rivals(live: Sequence[int], found: Sequence[Candidate]) -> dict[int, set[int]]:
     """Return for each candidate those that share an end or a cell with it."""
-    claims: dict[int | tuple[int, int], list[int]] = {}
+    claims: dict[End | tuple[int, int], list[int]] = {}
     for index in live:
         each = found[index]
-        for claim in (*each.cells, each.first, *((each.second,) if each.second >= 0 else ())):
+        claimed: tuple[End | tuple[int, int], ...] = *each.cells, *each.joined
+        for claim in claimed:
             claims.setdefault(claim, []).append(index)
     rivals: dict[int, set[int]] = {index: set() for index in live}
     for claimants in claims.values():

@@ -14,7 +14,8 @@ from mapping.values import FREE
 
 FARTHEST: Final = 24.0
 """Cells: water further away than this tells nothing about a wall."""
-_SPECK: Final = 14  # cells of wall that are still a speck, and may lie inside a hole
+SPECK: Final = 14
+"""So many cells of wall are still a speck, and may lie inside a hole."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +41,7 @@ class Scene:
 def look(walls: Walls, state: NDArray[np.uint8], water: NDArray[np.float64]) -> Scene:
     """Prepare a grid for drawing candidates; ``water`` is as ``from_water`` tells it."""
     size = np.bincount(walls.label.ravel()) if walls.label.size else np.zeros(1, np.int64)
-    speck = size <= _SPECK
+    speck = size <= SPECK
     speck[0] = True
     return Scene(walls, state, water, speck)
 

@@ -31,9 +31,9 @@ _SPUR_ROUNDS: Final = 2
 _SOLID: Final = 8.0  # cells from the nearest water: deeper is not wall but the ground behind it
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class End:
-    """A true end of a wall.
+    """A true end of a wall; two are the same only if they are one object.
 
     ``x``, ``y`` is the middle of the end face, ``dx``, ``dy`` the unit direction out of the wall; ``half`` half the
     wall's thickness; ``line`` ``(n, 2)`` float64 the centre line behind the end, nearest first; ``length`` the centre

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fill.certainty import Belief
 from fill.closing import Closed
-from fill.memory import Recent, content
+from fill.recent import Recent
 from fill.values import Hole
 from fill.witness import SEEN, distances, witness
 from mapping.values import Grid
@@ -40,8 +40,8 @@ def heard(closed: Closed, state: NDArray[np.uint8], belief: Belief, recent: Rece
     low = np.maximum(np.minimum(closed.cells.min(axis=0), closed.candidate.path.min(axis=0)) - _reach(closed), 0)
     high = np.maximum(closed.cells.max(axis=0), closed.candidate.path.max(axis=0)) + _reach(closed) + 1
     window = state[low[0] : high[0], low[1] : high[1]]
-    rivals = tuple((rival.path.tobytes(), chance) for rival, chance in closed.rivals)
-    key = (tuple(low.tolist()), window.shape, window.tobytes(), _content(closed), rivals)
+    drawn = closed.candidate, closed.cells.tobytes(), closed.away.tobytes(), closed.chance, closed.rivals
+    key = (tuple(low.tolist()), window.shape, window.tobytes(), drawn)
     return recent.recall(key, lambda: _hear(closed, state, belief))
 
 
@@ -77,16 +77,6 @@ def _hear(closed: Closed, state: NDArray[np.uint8], belief: Belief) -> Heard:
 def _reach(closed: Closed) -> int:
     """Cells about a fill that its witnesses look at."""
     return SEEN + int(closed.candidate.gap) + int(max(closed.candidate.half_a, closed.candidate.half_b))
-
-
-def _content(closed: Closed) -> Hashable:
-    candidate = closed.candidate
-    ends = tuple(content(end)[:5] for end in candidate.ends)
-    lines = tuple(end.line.tobytes() for end in candidate.ends)
-    return (
-        closed.cells.tobytes(), closed.away.tobytes(), closed.chance, candidate.features.tobytes(),
-        candidate.path.tobytes(), candidate.curve, candidate.second < 0, ends, lines,
-    )  # fmt: skip
 
 
 def _parents(closed: Closed, owner: NDArray[np.int32]) -> tuple[int, ...]:

@@ -32,47 +32,63 @@ _APART: Final = 4.0  # cells between two such places
 _OWN: Final = 2.5  # cells beside an end where its own wall is not met
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Way:
-    """A way from end ``first`` to end ``second`` (-1: the side of a wall), ``ends`` being the two as they were found.
+    """A way from one end to another, or to the side of a wall; ``ends`` are the two as they were found.
 
     ``path`` ``(n, 2)`` int32 of row and column, joined edge to edge; ``bow`` the rank of the bow that let the curve
     pass, or of the place on the side of a wall.
     """
 
-    first: int
-    second: int
     ends: tuple[End, End]
+    side: bool
     chord: Chord
     curve: Curve
     path: NDArray[np.int32]
     bow: int
 
+    @property
+    def joined(self) -> tuple[End, ...]:
+        """The true ends that it joins."""
+        return self.ends[:1] if self.side else self.ends
 
-def across(first: int, second: int, scene: Scene) -> list[Way]:
-    """Every way between two ends that crosses no free water."""
-    a, b = scene.ends[first], scene.ends[second]
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """Ways, and what was looked at for them.
+
+    ``looked`` ``(n, 2)`` are places, x and y, about which cells within ``margin`` were looked at; ``led``: also those
+    between the ends, as ``channels`` does.
+    """
+
+    ways: list[Way]
+    looked: NDArray[np.float64]
+    margin: float
+    led: bool = False
+
+
+def across(a: End, b: End, scene: Scene) -> Drawn:
+    """Draw every way between two ends that crosses no free water."""
     between = chord(a, b)
-    heights = _BOWS[np.abs(_BOWS) <= 0.25 * between.gap + 1.0]
+    highest = 0.25 * between.gap + 1.0
+    heights = _BOWS[np.abs(_BOWS) <= highest]
+    drawn = curves_between(a, b, between)
     found: list[Way] = []
-    for curve in curves_between(a, b, between):
-        way = _first_clear(curve, heights, (first, second), (a, b), between, scene)
+    for curve in drawn:
+        way = _first_clear(curve, heights, (a, b), between, scene)
         if way is not None and _new(way, found):
             found.append(way)
-    for curve in [] if found else channels(a, b, scene):
+    led = not found
+    for curve in channels(a, b, scene) if led else []:
         path = _path(curve, (a, b), scene)
         if path is not None:
-            way = Way(first, second, (a, b), between, curve, path, 0)
+            way = Way((a, b), False, between, curve, path, 0)
             found += [way] if _new(way, found) else []
-    return found
+    return Drawn(found, np.concatenate([curve.points for curve in drawn]), min(highest, _BOWS.max()) + 2.0, led)
 
 
-def onto_sides(index: int, scene: Scene, longest: float) -> tuple[list[Way], NDArray[np.float64]]:
-    """Let a wall go on until it meets another, or itself, at a place that is no end.
-
-    Returns the ways, and two corners ``(2, 2)``, x and y, of what was looked at.
-    """
-    a = scene.ends[index]
+def onto_sides(a: End, scene: Scene, longest: float) -> Drawn:
+    """Let a wall go on until it meets another, or itself, at a place that is no end."""
     found = []
     places, looked = _meets(a, scene, longest)
     for rank, (x, y) in enumerate(places):
@@ -84,8 +100,8 @@ def onto_sides(index: int, scene: Scene, longest: float) -> tuple[list[Way], NDA
         curve = straight(a.x, a.y, x, y, "side")
         path = _path(curve, (a, b), scene)
         if path is not None:
-            found.append(Way(index, -1, (a, b), chord(a, b), curve, path, rank))
-    return found, looked
+            found.append(Way((a, b), True, chord(a, b), curve, path, rank))
+    return Drawn(found, looked, 2.0)
 
 
 def curves_between(a: End, b: End, between: Chord) -> list[Curve]:
@@ -100,9 +116,8 @@ def curves_between(a: End, b: End, between: Chord) -> list[Curve]:
 
 
 def _first_clear(
-    curve: Curve, heights: NDArray[np.float64], pair: tuple[int, int], ends: tuple[End, End], between: Chord,
-    scene: Scene,
-) -> Way | None:  # fmt: skip
+    curve: Curve, heights: NDArray[np.float64], ends: tuple[End, End], between: Chord, scene: Scene
+) -> Way | None:
     """Return the least bow of a curve that passes."""
     points = bowed(curve, heights)
     crosses = np.any(at(scene.state, points[..., 0], points[..., 1]) == FREE, axis=1)
@@ -110,7 +125,7 @@ def _first_clear(
         bow = Curve(curve.name, points[rank])
         path = _path(bow, ends, scene)
         if path is not None:
-            return Way(*pair, ends, between, bow, path, rank)
+            return Way(ends, False, between, bow, path, rank)
     return None
 
 

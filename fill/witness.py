@@ -168,7 +168,7 @@ def _spread(closed: Closed) -> NDArray[np.float64]:
     """Distance ``(n, k)`` of each cell from each curve that its two ends allow, cells."""
     a, b = closed.candidate.ends
     found = [straight(a.x, a.y, b.x, b.y)]
-    if closed.candidate.second >= 0:
+    if not closed.candidate.side:
         found += curves(a, b, chord(a, b))
     places = closed.cells[:, ::-1].astype(np.float64)
     return np.stack([cKDTree(curve.points).query(places)[0] for curve in found], axis=1)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,9 +29,9 @@ def torn_room() -> NDArray[np.uint8]:
 def drawn(state: NDArray[np.uint8]) -> tuple[list[Way], Scene]:
     walls = open_walls(state == OCCUPIED, state)
     scene = look(walls, state, from_water(state))
-    count = len(walls.ends)
-    ways = [way for a in range(count) for b in range(a + 1, count) for way in across(a, b, scene)]
-    return ways + [way for index in range(count) for way in onto_sides(index, scene, 40.0)[0]], scene
+    pairs = itertools.combinations(walls.ends, 2)
+    ways = [way for a, b in pairs for way in across(a, b, scene).ways]
+    return ways + [way for end in walls.ends for way in onto_sides(end, scene, 40.0).ways], scene
 
 
 def test_what_is_told_of_a_way_does_not_hang_on_the_others() -> None:
@@ -38,7 +40,7 @@ def test_what_is_told_of_a_way_does_not_hang_on_the_others() -> None:
     together = features(ways, scene, closer)
     alone = [features([way], scene, [each]) for way, each in zip(ways, closer, strict=True)]
     assert together.shape == (len(ways), len(FEATURES))
-    assert {way.second < 0 for way in ways} == {True, False}
+    assert {way.side for way in ways} == {True, False}
     assert np.concatenate(alone).tobytes() == together.tobytes()
 
 

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from config.schema import Fill
 from fill.filler import Filler
-from fill.memory import Memory, Recent
+from fill.memory import Basis, Memory
+from fill.recent import Recent
 from fill.segments import find_walls
 from fill.values import Filled
 from mapping.values import FREE, OCCUPIED, UNKNOWN, Grid
@@ -113,9 +114,9 @@ def test_results_hold_until_something_in_their_box_changes() -> None:
     memory = Memory()
     made: list[int] = []
 
-    def make() -> tuple[tuple[int, int, int, int], int]:
+    def make() -> tuple[Basis, int]:
         made.append(len(made))
-        return (0, 0, 20, 20), len(made)
+        return Basis((0, 0, 20, 20)), len(made)
 
     def passed() -> None:
         memory.begin()

@@ -93,6 +93,6 @@ def test_more_is_asked_of_what_may_be_a_way_through() -> None:
 def test_of_ways_that_share_an_end_or_cross_the_best_set_is_taken() -> None:
     ways = found(slab(slice(40, 52)))
     taken = assign(ways, [chance(each) for each in ways])
-    ends = [end for index in taken for end in (ways[index].first, ways[index].second) if end >= 0]
+    ends = [end for index in taken for end in ways[index].joined]
     assert len(ends) == len(set(ends))
     assert taken

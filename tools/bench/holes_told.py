@@ -27,7 +27,7 @@ def fill_told(seen: NDArray[np.uint8], gone: NDArray[np.bool_]) -> NDArray[np.bo
     filled = np.zeros(seen.shape, bool)
     memory = Memory()
     wall = seen == OCCUPIED
-    found = [each for each in candidates(open_walls(wall, seen, memory), seen, _REACH, memory) if each.second >= 0]
+    found = [each for each in candidates(open_walls(wall, seen, memory), seen, _REACH, memory) if not each.side]
     if not found:
         return filled
     chances = prior().hole.chance(np.stack([each.features for each in found]))
