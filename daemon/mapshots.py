@@ -14,21 +14,28 @@ from daemon.swing import compass_facts
 from drivers.records import Json
 from fill.guide import Goal
 from fill.values import Filled, Hole, Mesh
-from mapping.values import Grid, Station
+from mapping.values import Grid, Outline, Station
 
 Stamp = tuple[int, int]
 """``(t_ns, utc_ns)`` of the record that made the snapshot."""
 
 
-def stations(stamp: Stamp, all_stations: Sequence[Station]) -> Snapshot:
+def stations(stamp: Stamp, all_stations: Sequence[Station], outlines: Sequence[Outline] = ()) -> Snapshot:
     """Every station, for later ones move earlier ones; ``newest`` is the index of the scan that came last.
 
-    ``compass`` is what the stations say of the compass (``daemon.swing``).
+    ``compass`` is what the stations say of the compass (``daemon.swing``).  Arrays ``wall_m`` ``(n, 2)`` f4 and
+    ``wall_station`` ``(n,)`` i4 are the wall points that floating pieces saw, and which station saw them.
     """
     newest: Json = all_stations[-1].scan.index if all_stations else None
     fields: dict[str, Json] = {"newest": newest, "stations": [_station(each) for each in all_stations]}
     fields["compass"] = compass_facts(all_stations)
-    return Snapshot("station", *stamp, fields)
+    seen = [np.full(len(each.xy_m), each.scan, np.int32) for each in outlines]
+    places = [each.xy_m for each in outlines]
+    arrays: dict[str, NDArray[Any]] = {
+        "wall_m": np.concatenate([np.zeros((0, 2), np.float32), *places]),
+        "wall_station": np.concatenate([np.zeros(0, np.int32), *seen]),
+    }
+    return Snapshot("station", *stamp, fields, arrays)
 
 
 def layers(grid: Grid) -> NDArray[np.uint8]:

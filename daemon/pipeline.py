@@ -62,7 +62,7 @@ class Pipeline:
     def state(self) -> MapState:
         """The map as it is."""
         filled, mesh = self._drawn or self._redraw()
-        return MapState(self._mapper.stations, self._mapper.grid, filled, mesh)
+        return MapState(self._mapper.stations, self._mapper.grid, filled, mesh, self._mapper.outlines)
 
     @property
     def whole(self) -> MapState:
@@ -105,7 +105,7 @@ class Pipeline:
     def _tell(self, whole: bool = False) -> list[Snapshot]:
         state, stamp = self.state, self._stamp
         return [
-            mapshots.stations(stamp, state.stations),
+            mapshots.stations(stamp, state.stations, state.outlines),
             *self._grids.tell(stamp, state.grid, whole),
             mapshots.fill(stamp, state.filled),
             mapshots.mesh(stamp, state.mesh),

@@ -12,21 +12,22 @@ from numpy.typing import NDArray
 
 from fill.values import Filled, Mesh
 from mapping.ensemble import Mixture
-from mapping.values import Grid, Level, Station
+from mapping.values import Grid, Level, Outline, Station
 
 
 @dataclass(frozen=True, slots=True)
 class MapState:
     """What is known at one moment: stations in the order of their scans, evidence, fills and surface.
 
-    ``mixture`` is the evidence mixed over the poses, None while the map still grows; ``levels`` is what was seen at
-    other depths, where walls are elsewhere, likewise.
+    ``outlines`` are the walls of floating pieces.  ``mixture`` is the evidence mixed over the poses, None while the map
+    still grows; ``levels`` is what was seen at other depths, where walls are elsewhere, likewise.
     """
 
     stations: tuple[Station, ...]
     grid: Grid
     filled: Filled
     mesh: Mesh
+    outlines: tuple[Outline, ...] = ()
     mixture: Mixture | None = None
     levels: tuple[Level, ...] = ()
 

@@ -9,7 +9,7 @@ from mapping.ensemble import Mixture
 from mapping.prior import Hint
 from mapping.sight import sight_of
 from mapping.stations import Stations
-from mapping.values import Grid, Level, Scan, Station
+from mapping.values import Grid, Level, Outline, Scan, Station
 
 
 class Mapper:
@@ -57,6 +57,11 @@ class Mapper:
     def grid(self) -> Grid:
         """Evidence of the placed stations; no cells before the first."""
         return self._grid
+
+    @property
+    def outlines(self) -> tuple[Outline, ...]:
+        """Walls of pieces that nothing ties to the map: to be shown, but no evidence."""
+        return self._stations.outlines
 
     @property
     def levels(self) -> tuple[Level, ...]:

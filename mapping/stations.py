@@ -26,8 +26,8 @@ from mapping.prior import Hint, Prior, agreed
 from mapping.sight import Sight
 from mapping.strides import Strides
 from mapping.swing import is_turned, swung
-from mapping.telling import Guess, largest, told
-from mapping.values import Grid, Level, Station
+from mapping.telling import Guess, largest, outlines, told
+from mapping.values import Grid, Level, Outline, Station
 from mapping.verdict import judge, nowhere, origin
 
 FEW_POINTS = 12
@@ -95,6 +95,11 @@ class Stations:
             Level(float(np.median([s.depth_m for s in told])), tuple(s.index for s in told), self._draw(plan))
             for told, plan in zip(scans, self._plans[1:], strict=True)
         )
+
+    @property
+    def outlines(self) -> tuple[Outline, ...]:
+        """What the scans of floating pieces saw of walls."""
+        return outlines(self._told, [sight.view.points.xy_m for sight in self._sights])
 
     def mixture(self) -> Mixture:
         """Mix the evidence over the places that the stations may have; this takes long, for a map that is done."""

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
 
 from config.schema import Map
 from mapping.graph import put_at, seen_from
 from mapping.pieces import Pieces
-from mapping.values import Pose, Station
+from mapping.values import Outline, Pose, Station
 from mapping.verdict import origin
+from mapping.view import to_map
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +48,19 @@ def told(
             begin = replace(stations[piece[0]], covariance=origin(judged[piece[0]].scan, config).covariance)
             stations[piece[0]] = begin
     return tuple(stations[k] for k in range(len(judged)))
+
+
+def outlines(stations: Sequence[Station], points_m: Sequence[NDArray[np.float64]]) -> tuple[Outline, ...]:
+    """Put the wall points ``(n, 2)`` of scans that hold together, but float, where their piece is told to lie.
+
+    A scan that holds to no other shows nothing: its own place is the guess then, not that of a piece.
+    """
+    alive = Counter(each.piece for each in stations if each.status != "dropped")
+    return tuple(
+        Outline(each.scan.index, each.piece, to_map(each.pose, xy_m).astype(np.float32))
+        for each, xy_m in zip(stations, points_m, strict=True)
+        if each.piece and each.status != "dropped" and alive[each.piece] > 1
+    )
 
 
 def _of_piece(

@@ -134,6 +134,18 @@ class Grid:
 
 
 @dataclass(frozen=True, slots=True)
+class Outline:
+    """The wall points ``(n, 2)`` float32, m, that a scan of a floating piece saw: as little evidence as its place.
+
+    ``scan`` is its index, ``piece`` its piece's number.
+    """
+
+    scan: int
+    piece: int
+    xy_m: NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True)
 class Level:
     """What scans of another depth than the map's saw of other walls: wells taper.
 

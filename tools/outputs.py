@@ -54,7 +54,7 @@ def write_outputs(
     if poses:
         replace_file(folder / "poses.csv", poses_csv(state.stations))
     replace_file(folder / "mesh.ply", ply_bytes(state.mesh, (origin.site, origin.line)))
-    plan = draw_plan(state.filled, state.stations, origin)
+    plan = draw_plan(state.filled, state.stations, origin, state.outlines)
     replace_file(folder / "plan.png", plan.png)
     replace_file(folder / "plan.pgw", plan.world.encode())
     facts = report(state, origin)

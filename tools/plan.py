@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from PIL import Image, PngImagePlugin
 
 from fill.values import Filled
-from mapping.values import Station
+from mapping.values import Outline, Station
 from tools import plan_canvas as canvas
 from tools.plan_canvas import Frame, frame_of, raster
 from tools.plan_marks import STATION, Pen, draw_certainties, draw_ellipses, draw_north, draw_scale_bar, draw_stations
-from tools.plan_pieces import PIECE, draw_dashes, draw_pieces, pieces_of, room_for
+from tools.plan_pieces import PIECE, draw_dashes, draw_pieces, draw_walls, pieces_of, room_for
 from tools.provenance import Provenance
 
 _PANEL: Final = 270  # width of the legend, px
@@ -45,11 +45,13 @@ class _Marked:
     names: Sequence[str]
 
 
-def draw_plan(filled: Filled, stations: Sequence[Station], origin: Provenance) -> Plan:
-    """Draw the plan, north up, with title, legend, scale bar and stations."""
+def draw_plan(
+    filled: Filled, stations: Sequence[Station], origin: Provenance, outlines: Sequence[Outline] = ()
+) -> Plan:
+    """Draw the plan, north up, with title, legend, scale bar, stations and what floating pieces saw."""
     pieces = pieces_of(stations)
     alone = [each for each in stations if each.piece not in pieces or each.status == "dropped"]
-    frame = frame_of(filled, np.concatenate([_places(alone), room_for(pieces, filled.grid.cell_m)]))
+    frame = frame_of(filled, np.concatenate([_places(alone), room_for(pieces, outlines, filled.grid.cell_m)]))
     names = _names(alone, pieces)
     lowest = max(frame.height, _LOWEST, _NAMES_AT + _NAMES_STEP * len(names))
     width, height = frame.width + _PANEL + 3 * _EDGE, lowest + _TITLE + _EDGE
@@ -59,6 +61,7 @@ def draw_plan(filled: Filled, stations: Sequence[Station], origin: Provenance) -
     image.paste(picture, (_EDGE * frame.fine, _TITLE * frame.fine))
     over = Pen(image, frame.fine, _EDGE, _TITLE)
     draw_certainties(over, frame, filled)
+    draw_walls(over, frame, outlines)
     draw_pieces(over, frame, pieces)
     draw_stations(over, frame, alone)
     _title(Pen(image, frame.fine, _EDGE, 0), origin, width - 2 * _EDGE)
@@ -138,7 +141,7 @@ def _mark_legend(pen: Pen, y: float, marked: _Marked) -> None:
         y += 24
     if marked.has_pieces:
         draw_dashes(pen, [(0, y + 1), (20, y + 1), (20, y + 15), (0, y + 15), (0, y + 1)], PIECE, 1.6)
-        pen.text(28, y + 8, "floating piece: its place is a guess", 13, anchor="lm")
+        pen.text(28, y + 8, "floating piece, dots its walls: a guess", 13, anchor="lm")
         y += 24
     for line in marked.names:
         pen.text(0, y, line, 13)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
-from mapping.values import Station
+from mapping.values import Outline, Station
 from tools import plan_canvas as canvas
 from tools.plan_canvas import Frame
 from tools.plan_marks import Pen, draw_station
@@ -30,11 +30,20 @@ def pieces_of(stations: Sequence[Station]) -> dict[int, list[Station]]:
     return {number: members for number, members in sorted(found.items()) if len(members) > 1}
 
 
-def room_for(pieces: dict[int, list[Station]], cell_m: float) -> NDArray[np.float64]:
-    """Return places ``(n, 2)`` of x and y, m, that leave room for the outlines."""
+def room_for(pieces: dict[int, list[Station]], outlines: Sequence[Outline], cell_m: float) -> NDArray[np.float64]:
+    """Return places ``(n, 2)`` of x and y, m, that leave room for the pieces and for what they saw."""
     places = np.array([(s.pose.x_m, s.pose.y_m) for members in pieces.values() for s in members]).reshape(-1, 1, 2)
     corners: NDArray[np.float64] = places + _ROOM_CELLS * cell_m * np.array([(-1, -1), (1, 1)])
-    return corners.reshape(-1, 2)
+    return np.concatenate([corners.reshape(-1, 2), *(each.xy_m for each in outlines)])
+
+
+def draw_walls(pen: Pen, frame: Frame, outlines: Sequence[Outline]) -> None:
+    """Dot the walls that floating pieces saw: no cells, for they are no evidence."""
+    size = max(frame.px / 2, 1.5)
+    for x_m, y_m in np.concatenate([np.zeros((0, 2)), *(each.xy_m for each in outlines)]):
+        x, y = frame.place(x_m, y_m)
+        corners = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
+        pen.polygon([(x + size / 2 * dx, y + size / 2 * dy) for dx, dy in corners], PIECE)
 
 
 def draw_pieces(pen: Pen, frame: Frame, pieces: dict[int, list[Station]]) -> None:

@@ -16,7 +16,7 @@ from daemon.wire import TOPICS, VERSION, decode, encode, numbered
 from drivers.readings import HeadSettings, Ping
 from drivers.records import Event
 from fill.values import Filled, Hole, Mesh
-from mapping.values import Grid, Pose, Scan, Station
+from mapping.values import Grid, Outline, Pose, Scan, Station
 
 HEAD = HeadSettings(10.0, 50.0, 10.0, 25.0, math.radians(1.8), True, 0.0, 0.0, True)
 STAMP = (5, 7)
@@ -90,7 +90,7 @@ def test_the_other_topics_come_back_as_they_went() -> None:
         np.array([1.0, 0.5, 0.0], np.float32),
     )
     told = [
-        mapshots.stations(STAMP, [a_station()]),
+        mapshots.stations(STAMP, [a_station()], [Outline(4, 3, np.eye(2, dtype=np.float32))]),
         mapshots.mesh(STAMP, surface),
         snapshots.event(Event(5, 7, "mark", {"text": "stairs"})),
         snapshots.health(5, 7, {"lag_s": 0.5}),

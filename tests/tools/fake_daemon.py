@@ -18,7 +18,7 @@ from daemon import mapshots, requests, snapshots, wire
 from daemon.broker import Broker, Route
 from daemon.requests import Request
 from daemon.snapshots import Snapshot
-from tests.tools.fake_site import filled, grid, mesh, ping, stations
+from tests.tools.fake_site import filled, grid, mesh, outlines, ping, stations
 
 PINGS_HZ: Final = 40.0
 
@@ -104,7 +104,7 @@ class FakeDaemon:
         guide: dict[str, Any] = {"goals": goals, "open": []}
         return [
             mapshots.grid_key(stamp, evidence),
-            mapshots.stations(stamp, stations()),
+            mapshots.stations(stamp, stations(), outlines()),
             mapshots.fill(stamp, filled(evidence, unseen, certainty)),
             mapshots.mesh(stamp, mesh()),
             Snapshot("guide", *stamp, guide),

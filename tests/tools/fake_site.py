@@ -13,7 +13,7 @@ from daemon import snapshots
 from daemon.snapshots import Snapshot
 from drivers.readings import HeadSettings, Ping
 from fill.values import ASSUMED, FILLED, MEASURED, Filled, Hole, Mesh
-from mapping.values import FREE, OCCUPIED, Grid, Pose, Scan, Station
+from mapping.values import FREE, OCCUPIED, Grid, Outline, Pose, Scan, Station
 
 CELL_M: Final = 0.05
 CORNERS_M: Final = np.array([(-3, -2), (3, -2), (3, 0), (6, 0), (6, 1.2), (3, 1.2), (3, 3), (-1, 3.6), (-3, 2.5)])
@@ -25,6 +25,7 @@ RANGE_M, BINS, STEP_DEG = 8.0, 400, 1.8
 PLACES_M: Final = ((0.0, 0.0), (-1.6, 1.2), (1.6, 1.9), (4.6, 0.55))
 PIECE_M: Final = ((4.4, 2.4), (5.6, 2.8))
 """Where two scans that hold together are guessed to lie."""
+PIECE_WALL_Y_M: Final = 4.2
 
 
 def walls() -> NDArray[np.float64]:
@@ -165,6 +166,12 @@ def stations() -> list[Station]:
         why = "fits its piece of 2 scans, which nothing ties to the map yet"
         found.append(Station(_scan(index), Pose(x, y, 1.2), np.diag([0.01, 0.01, 0.001]), "unplaced", 6, 9.0, why))
     return found
+
+
+def outlines() -> list[Outline]:
+    """A straight wall north of the two that float, as the first of them saw it."""
+    x_m = np.linspace(4.0, 6.0, 40)
+    return [Outline(5, 6, np.stack([x_m, np.full(40, PIECE_WALL_Y_M)], axis=1).astype(np.float32))]
 
 
 def _scan(index: int, heading_rad: float = 0.7) -> Scan:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from playwright.sync_api import Page, expect
 
-from tests.tools.fake_site import PIECE_M
+from tests.tools.fake_site import PIECE_M, PIECE_WALL_Y_M
 from tests.tools.sight import near, on_plan, orange, picture
 
 PIECE = (122, 47, 208)
@@ -68,6 +68,8 @@ def test_a_floating_piece_is_told_apart_from_the_map(page: Page) -> None:
     is_piece = near(pixels, PIECE, 24)
     assert is_piece[top:bottom, left:right].sum() > 60
     assert not is_piece[bottom:].any(), "nothing of the map has this colour"
+    wall = slice(*(on_plan(page, 5.0, PIECE_WALL_Y_M + away)[1] for away in (0.1, -0.1)))
+    assert is_piece[wall, on_plan(page, 4.1, 0.0)[0] : on_plan(page, 5.9, 0.0)[0]].any(axis=0).mean() > 0.3
     px, py = on_plan(page, x0, y0)
     page.locator("#plan").hover(position={"x": px, "y": py})
     expect(page.locator("#plan-readout")).to_contain_text("station 5 of piece 6, not tied yet: its place is a guess")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,15 +11,16 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from config.schema import Config
-from mapping.values import Station
+from mapping.values import Outline, Station
 from tests.tools import fake_site
 from tools.plan import Plan, draw_plan
 from tools.plan_pieces import PIECE, pieces_of, room_for
 from tools.provenance import provenance
 
 
-def plan(stations: list[Station]) -> Plan:
-    return draw_plan(fake_site.filled(*fake_site.grid()), stations, provenance(Config(), ("dive.mcap",), {}))
+def plan(stations: list[Station], outlines: Sequence[Outline] = ()) -> Plan:
+    origin = provenance(Config(), ("dive.mcap",), {})
+    return draw_plan(fake_site.filled(*fake_site.grid()), stations, origin, outlines)
 
 
 def violet(drawn: Plan, x_m: tuple[float, float], y_m: tuple[float, float]) -> NDArray[np.bool_]:
@@ -47,6 +49,13 @@ def test_a_piece_is_drawn_dashed_about_its_stations_and_nowhere_else() -> None:
     assert 0.2 < along.mean() < 1.0
 
 
+def test_what_a_piece_saw_of_walls_is_dotted_and_has_room() -> None:
+    drawn = plan(fake_site.stations(), fake_site.outlines())
+    y = fake_site.PIECE_WALL_Y_M
+    assert violet(drawn, (4.0, 6.0), (y - 0.1, y + 0.1)).any(axis=0).mean() > 0.3
+    assert not violet(drawn, (-3.0, 3.0), (-2.0, 3.0)).any()
+
+
 def test_a_map_in_one_piece_has_no_such_colour() -> None:
     drawn = plan([each for each in fake_site.stations() if each.piece != 6])
     pixels = np.asarray(Image.open(io.BytesIO(drawn.png)).convert("RGB")).astype(int)
@@ -63,4 +72,4 @@ def test_the_frame_holds_pieces_far_off_and_the_legend_all_names() -> None:
     assert violet(drawn, (24.0, 26.0), (2.0, 3.2)).sum() > 100
     assert Image.open(io.BytesIO(drawn.png)).width != Image.open(io.BytesIO(before.png)).width
     assert Image.open(io.BytesIO(drawn.png)).height > 350 + 18 * len(number)
-    assert room_for({}, 0.05).shape == (0, 2)
+    assert room_for({}, (), 0.05).shape == (0, 2)

@@ -37,6 +37,16 @@ export function drawPieces(g, view, pieces, alone, newest) {
   }
 }
 
+/** What the scans of pieces saw of walls: dots, not cells, for it is no evidence. `walls` is x, y, x, y... in m. */
+export function drawPieceWalls(g, view, walls) {
+  const size = Math.min(Math.max(0.05 * view.scale, 1.6), 4);
+  g.fillStyle = PIECE;
+  for (let i = 0; i < walls.length; i += 2) {
+    const [x, y] = view.toScreen(walls[i], walls[i + 1]);
+    g.fillRect(x - size / 2, y - size / 2, size, size);
+  }
+}
+
 /** Write above the outline, or below where another station stands in the way. */
 function label(g, view, edge, others, words) {
   const half = words.length * 3.4;

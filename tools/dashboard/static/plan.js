@@ -2,7 +2,7 @@
 
 import { Evidence, Fills } from "./grid.js";
 import { drawEllipses, drawGoals, drawNorth, drawOpenEnds, drawScaleBar, drawStations, drawTrack, hasPlace } from "./marks.js";
-import { drawPieces, pieceWords, piecesOf } from "./pieces.js";
+import { drawPieces, drawPieceWalls, pieceWords, piecesOf } from "./pieces.js";
 import { View } from "./view.js";
 
 const UNKNOWN = "#59636d";
@@ -26,7 +26,7 @@ export class Plan {
     this.fills.clear();
     this.goals = [];
     this.view.touched = false;
-    this.setStations({ stations: [], newest: null });
+    this.setStations({ header: { stations: [], newest: null }, arrays: {} });
     this.request();
   }
 
@@ -36,14 +36,15 @@ export class Plan {
     else if (topic === "grid/delta") { if (!this.evidence.delta(message)) return false; }
     else if (topic === "fill") this.fills.set(message);
     else if (topic === "guide") this.goals = header.goals ?? [];
-    else if (topic === "station") this.setStations(header);
+    else if (topic === "station") this.setStations(message);
     if (!this.view.touched) this.fit();
     this.request();
     return true;
   }
 
-  setStations(header) {
+  setStations({ header, arrays }) {
     this.stations = header.stations;
+    this.pieceWalls = arrays.wall_m ?? [];
     this.newest = header.newest;
     this.pieces = piecesOf(this.stations);
     const inPieces = new Set(this.pieces.flatMap((piece) => piece.members));
@@ -75,6 +76,10 @@ export class Plan {
       box[0] = Math.min(box[0], mark.x_m); box[1] = Math.min(box[1], mark.y_m);
       box[2] = Math.max(box[2], mark.x_m); box[3] = Math.max(box[3], mark.y_m);
     }
+    this.pieceWalls.forEach((m, i) => {
+      box[i % 2] = Math.min(box[i % 2], m);
+      box[2 + (i % 2)] = Math.max(box[2 + (i % 2)], m);
+    });
     this.view.fit(box);
     this.view.touched = false;
   }
@@ -106,6 +111,7 @@ export class Plan {
     drawOpenEnds(g, view, this.fills.openEnds);
     drawEllipses(g, view, this.alone);
     drawTrack(g, view, this.alone);
+    drawPieceWalls(g, view, this.pieceWalls);
     drawPieces(g, view, this.pieces, this.alone, this.newest);
     drawStations(g, view, this.alone, this.newest);
     drawGoals(g, view, this.goals);
