@@ -72,14 +72,22 @@ class Belief:
     site: Logistic
     whole: NDArray[np.float64]
 
-    def certainty(self, log_odds: NDArray[np.float64], away: NDArray[np.float64]) -> NDArray[np.float32]:
-        """Certainty ``(n,)`` of a fill's cells, ``away`` ``(n,)`` cells from what was measured; never growing."""
-        chance = np.clip(sigmoid(self.site.weights[0] + self.site.weights[1] * log_odds), LOWEST, HIGHEST)
-        return falling(chance, away).astype(np.float32)
+    def certainties(
+        self, log_odds: Sequence[NDArray[np.float64]], away: Sequence[NDArray[np.float64]]
+    ) -> list[NDArray[np.float32]]:
+        """Certainties ``(n,)`` of each fill's cells, ``away`` ``(n,)`` cells from what was measured; never growing."""
+        if not log_odds:
+            return []
+        told = self.site.weights[0] + self.site.weights[1] * np.concatenate(log_odds)
+        chance = np.clip(sigmoid(told), LOWEST, HIGHEST)
+        counts = np.array([len(each) for each in away])
+        fallen = all_falling(chance, np.concatenate(away), counts).astype(np.float32)
+        return np.split(fallen, np.cumsum(counts)[:-1])
 
-    def hole_certainty(self, certainty: NDArray[np.float32]) -> float:
-        """Certainty that a whole fill is right, from that of its cells ``(n,)``."""
-        return float(np.clip(sigmoid(whole_features([certainty]) @ self.whole)[0], LOWEST, HIGHEST))
+    def hole_certainties(self, certainties: Sequence[NDArray[np.float32]]) -> NDArray[np.float64]:
+        """Certainties ``(m,)`` that whole fills are right, from those of their cells ``(n,)``."""
+        told = np.sum(whole_features(certainties) * self.whole, axis=1)
+        return np.clip(sigmoid(told), LOWEST, HIGHEST)
 
 
 def design_of(hole: NDArray[np.float64], cells: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -106,10 +114,29 @@ def falling(chance: NDArray[np.float64], away: NDArray[np.float64]) -> NDArray[n
     return fallen
 
 
+def all_falling(
+    chance: NDArray[np.float64], away: NDArray[np.float64], counts: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Let each of several runs of values fall, as ``falling`` does; they lie behind each other, ``counts`` long."""
+    run = np.repeat(np.arange(len(counts)), counts)
+    order = np.lexsort((-chance, away, run))
+    grows = (np.diff(chance[order]) > 0.0) & (np.diff(run) == 0)
+    fallen = chance.copy()
+    first = np.cumsum(counts) - counts
+    for each in np.unique(run[1:][grows]).tolist():
+        part = slice(first[each], first[each] + counts[each])
+        fallen[part] = falling(chance[part], away[part])
+    return fallen
+
+
 def whole_features(certainties: Sequence[NDArray[np.float32]]) -> NDArray[np.float64]:
     """Features ``(m, 4)`` of whole fills: one, log-odds of the least sure cell and of the mean, log of their number."""
-    rows = [(float(each.min()), float(each.mean(dtype=np.float64)), float(len(each))) for each in certainties]
-    least, mean, count = np.array(rows).reshape(-1, 3).T
+    if not certainties:
+        return np.zeros((0, 4))
+    count = np.array([len(each) for each in certainties])
+    first = np.cumsum(count) - count
+    cells = np.concatenate(certainties).astype(np.float64)
+    least, mean = np.minimum.reduceat(cells, first), np.add.reduceat(cells, first) / count
     return np.stack([np.ones_like(least), log_odds(least), log_odds(mean), np.log(count)], axis=1)
 
 

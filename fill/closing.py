@@ -51,7 +51,7 @@ def close_holes(
     walls = open_walls(wall, state, memory)
     closed: list[Closed] = []
     for reach in _rounds(longest):
-        fresh = _close_round(candidates(walls, state, reach, memory), model, threshold, state, wall)
+        fresh = _close_round(candidates(walls, state, reach, memory), model, threshold, state, wall, memory)
         walls = open_walls(wall, state, memory)
         closed += fresh
     return closed
@@ -82,8 +82,9 @@ def _longest(ends: tuple[End, ...]) -> tuple[End, ...]:
 
 
 def _close_round(
-    found: list[Candidate], model: Logistic, threshold: float, state: NDArray[np.uint8], wall: NDArray[np.bool_]
-) -> list[Closed]:
+    found: list[Candidate], model: Logistic, threshold: float, state: NDArray[np.uint8], wall: NDArray[np.bool_],
+    memory: Memory,
+) -> list[Closed]:  # fmt: skip
     """Take the best candidates, and mark their cells in ``wall``."""
     if not found:
         return []
@@ -93,8 +94,8 @@ def _close_round(
     gains = [gain(chance, asked(each, threshold)) for chance, each in zip(chances.tolist(), found, strict=True)]
     for index in assign(found, gains):
         rivals = _rivals(index, found, by_end, chances)
-        for cells in fill_cells(found[index], state, wall):
-            closed.append(Closed(found[index], cells, _away(cells, found[index]), float(chances[index]), rivals))
+        for cells, away in _stretches(found[index], state, wall, memory):
+            closed.append(Closed(found[index], cells, away, float(chances[index]), rivals))
             wall[cells[:, 0], cells[:, 1]] = True
     return closed
 
@@ -133,12 +134,35 @@ def fill_cells(candidate: Candidate, state: NDArray[np.uint8], wall: NDArray[np.
 
     Where measured wall stands in between, each stretch of the fill comes by itself.
     """
-    path = candidate.path
+    low, open_here = _room(candidate, state, wall)
+    return _taken(candidate, low, open_here)
+
+
+def _stretches(
+    candidate: Candidate, state: NDArray[np.uint8], wall: NDArray[np.bool_], memory: Memory
+) -> list[tuple[NDArray[np.int32], NDArray[np.float64]]]:
+    """Return cells as ``fill_cells`` does, and how far each is from the nearer end."""
+    low, open_here = _room(candidate, state, wall)
+
+    def made() -> list[tuple[NDArray[np.int32], NDArray[np.float64]]]:
+        return [(cells, _away(cells, candidate)) for cells in _taken(candidate, low, open_here)]
+
+    return memory.recent(("cells", candidate.way, open_here.tobytes()), made)
+
+
+def _room(
+    candidate: Candidate, state: NDArray[np.uint8], wall: NDArray[np.bool_]
+) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+    """Cells about a way that may be filled, and the row and column of the first."""
     margin = int(max(candidate.half_a, candidate.half_b)) + 2
-    low = np.maximum(path.min(axis=0) - margin, 0)
-    high = path.max(axis=0) + margin + 1
+    low = np.maximum(candidate.path.min(axis=0) - margin, 0)
+    high = candidate.path.max(axis=0) + margin + 1
     window = slice(low[0], high[0]), slice(low[1], high[1])
-    open_here = (state[window] == UNKNOWN) & ~wall[window]
+    return low, (state[window] == UNKNOWN) & ~wall[window]
+
+
+def _taken(candidate: Candidate, low: NDArray[np.int32], open_here: NDArray[np.bool_]) -> list[NDArray[np.int32]]:
+    path = candidate.path
     rows, cols = (path - low).T
     bare = np.ones(open_here.shape, bool)
     bare[rows, cols] = False

@@ -19,8 +19,8 @@ class Logistic:
     precision: NDArray[np.float64]
 
     def chance(self, features: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Probability ``(n,)`` for features ``(n, k)``."""
-        return sigmoid(features @ self.weights)
+        """Probability ``(n,)`` for features ``(n, k)``; that of one row does not hang on the others."""
+        return sigmoid(np.sum(features * self.weights, axis=1))
 
     def taught(self, features: NDArray[np.float64], right: NDArray[np.float64], count: NDArray[np.float64]) -> Logistic:
         """Return the model after outcomes ``right`` ``(n,)`` of 0 or 1 were seen, each counting as ``count`` ``(n,)``.

@@ -40,7 +40,8 @@ def heard(closed: Closed, state: NDArray[np.uint8], belief: Belief, recent: Rece
     low = np.maximum(np.minimum(closed.cells.min(axis=0), closed.candidate.path.min(axis=0)) - _reach(closed), 0)
     high = np.maximum(closed.cells.max(axis=0), closed.candidate.path.max(axis=0)) + _reach(closed) + 1
     window = state[low[0] : high[0], low[1] : high[1]]
-    drawn = closed.candidate, closed.cells.tobytes(), closed.away.tobytes(), closed.chance, closed.rivals
+    rivals = tuple((rival.way, chance) for rival, chance in closed.rivals)
+    drawn = closed.candidate.way, closed.candidate.features.tobytes(), closed.cells.tobytes(), closed.chance, rivals
     key = (tuple(low.tolist()), window.shape, window.tobytes(), drawn)
     return recent.recall(key, lambda: _hear(closed, state, belief))
 
@@ -49,23 +50,22 @@ def tell(
     closed: Sequence[Closed], told: Sequence[Heard], belief: Belief, grid: Grid, ends_m: NDArray[np.float64]
 ) -> tuple[Hole, ...]:
     """Make holes of fills; ``ends_m`` ``(n, 2, 2)``.  A fill is never surer than those that it goes on from."""
-    owner = np.full(grid.state.shape, -1, np.int32)
+    certainties = belief.certainties([each.log_odds for each in told], [each.away for each in told])
+    wholes = belief.hole_certainties(certainties).tolist()
+    parents = _parents(closed, grid.state.shape)
     holes: list[Hole] = []
-    for index, (each, witnessed) in enumerate(zip(closed, told, strict=True)):
-        parents = tuple(p for p in _parents(each, owner) if closed[p].candidate is not each.candidate)
-        certainty = belief.certainty(witnessed.log_odds, witnessed.away)
-        whole = belief.hole_certainty(certainty)
-        for parent in parents:
+    for index, (each, witnessed, certainty) in enumerate(zip(closed, told, certainties, strict=True)):
+        whole = wholes[index]
+        for parent in parents[index]:
             certainty = np.minimum(certainty, holes[parent].certainty.min())
             whole = min(whole, holes[parent].hole_certainty)
         gap_m = each.candidate.gap * grid.cell_m
         holes.append(
             Hole(
                 index, each.cells, certainty, whole, ends_m[index], gap_m, each.candidate.curve,
-                _why(each.candidate.curve, gap_m, whole, witnessed.beyond), parents, witnessed.beyond,
+                _why(each.candidate.curve, gap_m, whole, witnessed.beyond), parents[index], witnessed.beyond,
             )
         )  # fmt: skip
-        owner[each.cells[:, 0], each.cells[:, 1]] = index
     return tuple(holes)
 
 
@@ -79,13 +79,24 @@ def _reach(closed: Closed) -> int:
     return SEEN + int(closed.candidate.gap) + int(max(closed.candidate.half_a, closed.candidate.half_b))
 
 
-def _parents(closed: Closed, owner: NDArray[np.int32]) -> tuple[int, ...]:
-    """Holes whose fills lie next to this one or in the walls that gave it its direction."""
-    lines = np.concatenate([end.line for end in closed.candidate.ends])[:, ::-1]
-    near = np.concatenate([np.rint(lines).astype(np.int64), closed.candidate.path.astype(np.int64)])
-    rows, cols = np.clip(near, 0, np.array(owner.shape) - 1).T
-    met = owner[rows, cols]
-    return tuple(np.unique(met[met >= 0]).tolist())
+def _parents(closed: Sequence[Closed], shape: tuple[int, ...]) -> list[tuple[int, ...]]:
+    """Earlier holes whose fills lie next to each one or in the walls that gave it its direction."""
+    parents: list[tuple[int, ...]] = [()] * len(closed)
+    if not closed:
+        return parents
+    owner = np.full(shape, -1, np.int64)
+    for index, each in enumerate(closed):
+        owner[each.cells[:, 0], each.cells[:, 1]] = index
+    near = [
+        np.concatenate([each.candidate.path, *(end.line[:, ::-1] for end in each.candidate.ends)]) for each in closed
+    ]
+    rows, cols = np.clip(np.rint(np.concatenate(near)).astype(np.int64), 0, np.array(shape) - 1).T
+    met, own = owner[rows, cols], np.repeat(np.arange(len(closed)), [len(each) for each in near])
+    earlier = (met >= 0) & (met < own)
+    for child, parent in np.unique(np.stack([own[earlier], met[earlier]], axis=1), axis=0).tolist():
+        if closed[child].candidate is not closed[parent].candidate:
+            parents[child] = *parents[child], parent
+    return parents
 
 
 def _why(curve: str, gap_m: float, chance: float, beyond: bool) -> str:

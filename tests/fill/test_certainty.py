@@ -35,9 +35,9 @@ def test_certainties_keep_within_their_bounds_however_odd_the_features() -> None
     random = np.random.default_rng(1)
     hole = random.normal(0.0, 100.0, len(HOLE_FEATURES))
     cells = random.normal(0.0, 100.0, (50, (len(DESIGN) - len(HOLE_FEATURES)) // 3))
-    certainty = belief.certainty(belief.cell.log_odds(hole, cells), np.arange(50.0))
+    (certainty,) = belief.certainties([belief.cell.log_odds(hole, cells)], [np.arange(50.0)])
     assert np.all((certainty >= np.float32(LOWEST)) & (certainty <= np.float32(HIGHEST)))
-    assert LOWEST <= belief.hole_certainty(certainty) <= HIGHEST
+    assert LOWEST <= belief.hole_certainties([certainty])[0] <= HIGHEST
 
 
 def test_beyond_the_longest_learnt_gap_less_is_told_the_longer_it_is() -> None:
