@@ -16,6 +16,7 @@ from config.schema import Map
 from tools.bench import (
     acquisition,
     beams,
+    circles,
     fill_times,
     holes,
     holes_maps,
@@ -87,10 +88,11 @@ def _measure(name: str, args: argparse.Namespace) -> Iterator[Row]:
 
 
 def _tank(args: argparse.Namespace) -> Iterator[Row]:
-    for circles in (1, 14):
-        yield asdict(tank.measure(args.data, circles))
-    scans = beams.tank_scans(args.data / "sonar" / "micron-tank-14scans.npz", 14)
-    yield asdict(beams.judge_beams(scans, Map()))
+    for path in circles.recordings(args.data):
+        whole = circles.read_circles(path)
+        for count in sorted({1, whole.count}):
+            yield {"recording": path.stem, **asdict(tank.measure(whole.first(count)))}
+        yield {"recording": path.stem, **asdict(beams.judge_beams(whole.scans, Map()))}
 
 
 def _truth(args: argparse.Namespace) -> Iterator[Row]:

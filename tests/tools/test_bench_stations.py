@@ -2,15 +2,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from config.errors import UsageError
-from tools.bench.stations import pairs, read
+from config.errors import DataError, UsageError
+from tools.bench.stations import measure, pairs, read
 from tools.bench.whole_logs import whole
 
 
 def test_pairs_of_a_real_log_are_near_and_none_is_confidently_wrong(shared_data: Path) -> None:
-    figures = pairs(shared_data / "stations", "intel")
+    figures = pairs(read(shared_data / "stations" / "intel.npz"), "intel")
     assert figures.pairs == 47
     assert figures.near > 0.85
     assert figures.accepted > 0.5
@@ -19,7 +20,10 @@ def test_pairs_of_a_real_log_are_near_and_none_is_confidently_wrong(shared_data:
 
 def test_a_log_that_is_not_there_is_told(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="--data"):
-        read(tmp_path / "none.npz")
+        next(measure(tmp_path))
+    np.savez(tmp_path / "other.npz", a=np.zeros(3))
+    with pytest.raises(DataError, match="no log of stations"):
+        read(tmp_path / "other.npz")
 
 
 @pytest.mark.slow

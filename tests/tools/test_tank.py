@@ -13,15 +13,16 @@ from config.errors import DataError, InputError
 from config.schema import Map
 from mapping.echoes import VAGUE_SD_M, pick
 from mapping.values import Scan
-from tools.bench.beams import fit_room, judge_beams, tank_scans
-from tools.bench.tank import judge_tank, map_tank
+from tools.bench.beams import fit_room, judge_beams
+from tools.bench.circles import read_circles, recordings
+from tools.bench.tank import judge_tank, map_tank, tank_capture
 from tools.emulator.echoes import EchoModel, Place, Sampling
 from tools.emulator.site import TILE, Site, Stop, Wall, rectangle
 
 
 @pytest.mark.parametrize("circles", [1, 14])
 def test_the_real_tank_is_one_rectangular_room(shared_data: Path, tmp_path: Path, circles: int) -> None:
-    grid = map_tank(shared_data / "sonar" / "micron-tank-14scans.npz", tmp_path, circles)
+    grid = map_tank(read_circles(shared_data / "sonar" / "micron-tank-14scans.npz").first(circles), tmp_path)
     figures = judge_tank(grid, circles)
     assert sorted((figures.side_a_m, figures.side_b_m)) == pytest.approx([4.4, 4.6], abs=0.1)
     assert figures.occupied_cells > 200
@@ -34,7 +35,7 @@ def test_the_real_tank_is_one_rectangular_room(shared_data: Path, tmp_path: Path
 
 
 def test_most_beams_find_the_real_tank_and_those_that_are_sure_are_right(shared_data: Path) -> None:
-    figures = judge_beams(tank_scans(shared_data / "sonar" / "micron-tank-14scans.npz", 14), Map())
+    figures = judge_beams(read_circles(shared_data / "sonar" / "micron-tank-14scans.npz").scans, Map())
     assert figures.circles == 14
     assert figures.all_near_walls > 0.82
     assert figures.sure > 0.65
@@ -43,10 +44,10 @@ def test_most_beams_find_the_real_tank_and_those_that_are_sure_are_right(shared_
 
 def test_what_is_no_recording_of_a_tank_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot read"):
-        tank_scans(tmp_path / "none.npz", 1)
+        read_circles(tmp_path / "none.npz")
     np.savez(tmp_path / "other.npz", a=np.zeros(3))
     with pytest.raises(DataError, match="not a recording"):
-        tank_scans(tmp_path / "other.npz", 1)
+        read_circles(tmp_path / "other.npz")
     silent = Scan(
         0, 0, 1, 0.0, math.nan, np.linspace(0.0, 6.28, 200), np.zeros((200, 400), np.uint8), 0.02, 0.0314, "full"
     )
@@ -83,3 +84,38 @@ def test_a_wall_in_the_ringing_is_seen_and_not_the_room_behind_it(width_m: float
     room = fit_room(scan.bearing_rad[sure], returns.range_m[sure])
     assert room is not None
     assert sorted(room.sides_m) == pytest.approx(sorted((width_m, length_m)), abs=0.06)
+
+
+def saved(path: Path, beams: int, circles: int, bin_m: float) -> Path:
+    angle_deg = np.arange(beams * circles) * 360.0 / beams % 360.0
+    np.savez(path, angle_deg=angle_deg, bin_m=np.full(3, bin_m), intensity=np.zeros((beams * circles, 50), np.uint8))
+    return path
+
+
+def test_recordings_of_circles_are_found_by_what_is_in_them(tmp_path: Path) -> None:
+    (tmp_path / "sonar").mkdir()
+    with pytest.raises(InputError, match="no recording of circles"):
+        recordings(tmp_path)
+    path = saved(tmp_path / "sonar" / "pond.npz", beams=100, circles=3, bin_m=0.025)
+    np.savez(tmp_path / "sonar" / "other.npz", angle_deg=np.zeros(3))
+    (tmp_path / "sonar" / "broken.npz").write_bytes(b"no archive")
+    assert recordings(tmp_path) == [path]
+    whole = read_circles(path)
+    assert (whole.beams, whole.count, whole.first(2).count, len(whole.scans)) == (100, 3, 2, 3)
+    assert whole.scans[1].step_rad == pytest.approx(math.radians(3.6))
+
+
+def test_a_capture_of_coarser_bins_keeps_the_speed_of_sound_believable(tmp_path: Path) -> None:
+    for bin_m in (0.0125, 0.025, 0.05):
+        frames, sound_speed_m_s = tank_capture(read_circles(saved(tmp_path / "a.npz", 200, 1, bin_m)))
+        assert 1450.0 < sound_speed_m_s < 1550.0
+        assert frames.count(b"@") >= 200
+
+
+def test_a_head_that_does_not_turn_or_turns_less_than_once_makes_no_circle(tmp_path: Path) -> None:
+    np.savez(tmp_path / "still.npz", angle_deg=np.zeros(9), bin_m=0.02, intensity=np.zeros((9, 50), np.uint8))
+    with pytest.raises(DataError, match="does not turn"):
+        read_circles(tmp_path / "still.npz")
+    np.savez(tmp_path / "part.npz", angle_deg=np.arange(9.0), bin_m=0.02, intensity=np.zeros((9, 50), np.uint8))
+    with pytest.raises(DataError, match="no whole circle"):
+        read_circles(tmp_path / "part.npz")

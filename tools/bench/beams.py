@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from config.errors import DataError, InputError
+from config.errors import DataError
 from config.schema import Map
 from mapping.echoes import VAGUE_SD_M, answers_m, beams_of, in_order, peaks_along, pick
 from mapping.values import Scan
 from tools.bench.rectangle import NEAR_M, Rectangle, fit_rectangle
 
 THIN_M: Final = 0.05
-BEAMS: Final = 200
-"""Beams of a circle of the recordings of tanks."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,27 +25,6 @@ class BeamFigures:
     all_near_walls: float
     sure: float
     sure_near_walls: float
-
-
-def tank_scans(recording: Path, circles: int) -> list[Scan]:
-    """Return the circles of a recording of a head at rest in a tank (see ``tools.bench.tank``).
-
-    Raises InputError or DataError where the recording is not there or is something else.
-    """
-    try:
-        with np.load(recording, allow_pickle=False) as arrays:
-            bearing, bin_m, echoes = np.radians(arrays["angle_deg"]), arrays["bin_m"], arrays["intensity"]
-    except OSError as error:
-        raise InputError(f"cannot read {recording}: {error.strerror}; give the folder of recordings") from error
-    except (KeyError, ValueError) as error:
-        raise DataError(f"{recording} is not a recording of circles: {error}") from error
-    step = math.tau / BEAMS
-    whole = [slice(k * BEAMS, (k + 1) * BEAMS) for k in range(min(circles, len(bearing) // BEAMS))]
-    spacing_m = float(np.median(bin_m))
-    return [
-        Scan(k, 0, 1, 0.0, math.nan, bearing[s].astype(np.float64), echoes[s].astype(np.uint8), spacing_m, step, "full")
-        for k, s in enumerate(whole)
-    ]
 
 
 def judge_beams(scans: list[Scan], config: Map) -> BeamFigures:

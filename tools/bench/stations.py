@@ -6,7 +6,7 @@ only.  Their angles turn counter-clockwise from east.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import degrees, pi, radians
 from pathlib import Path
@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from config.errors import UsageError
+from config.errors import DataError, UsageError
 from config.schema import Map
 from mapping.prior import Prior
 from mapping.register import register
@@ -26,7 +26,6 @@ from mapping.verdict import judge
 from tools.bench.align import angle_between
 from tools.bench.whole_logs import LogFigures, whole
 
-LOGS: Final = ("intel", "freiburg-079", "fhw")
 REACH_M: Final = 3.0
 NEAR_M, NEAR_DEG, WRONG_M = 0.15, 3.0, 0.5
 IN_95: Final = 5.99
@@ -62,10 +61,14 @@ class Laser:
 
 
 def read(path: Path) -> Laser:
-    """Read a log; raises UsageError where there is none."""
-    if not path.is_file():
-        raise UsageError(f"no stations in {path}; name the folder of recordings with --data")
-    log = np.load(path)
+    """Read a log; raises DataError where it is something else."""
+    try:
+        return _laser(np.load(path, allow_pickle=False))
+    except (KeyError, ValueError, IndexError) as error:
+        raise DataError(f"{path} is no log of stations: {error}") from error
+
+
+def _laser(log: Mapping[str, NDArray[np.float64]]) -> Laser:
     headings, compass = (pi / 2.0 - angle.astype(np.float64) for angle in (log["ref"][:, 2], log["compass"]))
     bearing = -log["bearing"].astype(np.float64)
     sights = [
@@ -82,9 +85,8 @@ def _sight(index: int, range_m: Floats, bearing_rad: Floats, heading_rad: float)
     return sight_of(scan, returns, Map())
 
 
-def pairs(folder: Path, name: str) -> PairFigures:
+def pairs(log: Laser, name: str) -> PairFigures:
     """Register each scan in the one before it, where both are within reach."""
-    log = read(folder / f"{name}.npz")
     steps_m = np.hypot(*np.diff(log.true_m, axis=0).T)
     within = np.flatnonzero((np.diff(log.chain) == 0) & (steps_m <= REACH_M))
     rows = [(float(steps_m[i]), *_pair(log, int(i))) for i in within]
@@ -128,10 +130,13 @@ def _covered(covariance: Floats, off_m: Floats) -> bool:
     return bool(off_m @ np.linalg.solve(covariance[:2, :2], off_m) <= IN_95)
 
 
-def measure(folder: Path) -> Iterator[PairFigures | LogFigures]:
-    """Yield the figures of all logs."""
-    for name in LOGS:
-        yield pairs(folder / "stations", name)
-    for name in LOGS:
+def measure(data: Path) -> Iterator[PairFigures | LogFigures]:
+    """Yield the figures of all logs in a folder of recordings; raises UsageError where there is none."""
+    logs = {path.stem: read(path) for path in sorted((data / "stations").glob("*.npz"))}
+    if not logs:
+        raise UsageError(f"no stations in {data / 'stations'}; name the folder of recordings with --data")
+    for name, log in logs.items():
+        yield pairs(log, name)
+    for name, log in logs.items():
         for hinted in (False, True):
-            yield whole(read(folder / "stations" / f"{name}.npz"), name, hinted=hinted)
+            yield whole(log, name, hinted=hinted)

@@ -1,11 +1,12 @@
 """The real tank: circles of a Micron at rest, encoded as a serial capture and sent through the whole program.
 
-Kept recordings of this kind are arrays (``time_s``, ``angle_deg``, ``bin_m``, ``intensity``); the capture that is
-made of them is what the head had sent, so import, decoding, scan, echoes and grid are all in the measurement.
+Kept recordings of this kind are arrays (``tools.bench.circles``); the capture that is made of them is what the head
+had sent, so import, decoding, scan, echoes and grid are all in the measurement.
 """
 
 from __future__ import annotations
 
+import math
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,15 +15,17 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from config.errors import DataError, InputError
+from config.errors import DataError
 from drivers.tritech.headdata import USUAL_CONTROL, Control, HeadData, encode_head_data
 from mapping.values import OCCUPIED, Grid
 from tools import import_log, replay
+from tools.bench.circles import Circles
 from tools.bench.quiet import run_command
 from tools.bench.rectangle import NEAR_M, fit_rectangle
 from tools.maps import read_map
 
-AD_INTERVAL: Final = 26
+_USUAL_SPEED_M_S: Final = 1500.0
+"""The head counts time in ticks: so many to a bin as make sound about as fast as it is in water."""
 _TICK_S: Final = 640e-9
 _UNITS: Final = 6400
 
@@ -40,45 +43,36 @@ class TankFigures:
     side_b_m: float
 
 
-def tank_capture(recording: Path, circles: int) -> tuple[bytes, float]:
-    """Encode a recording's beams as the frames that a head sends; return them and the sound speed that fits the bins.
-
-    Raises InputError or DataError where the recording is not there or is something else.
-    """
-    try:
-        with np.load(recording, allow_pickle=False) as arrays:
-            angle_deg, bin_m, echoes = arrays["angle_deg"], arrays["bin_m"], arrays["intensity"]
-    except OSError as error:
-        raise InputError(f"cannot read {recording}: {error.strerror}; give the folder of recordings") from error
-    except (KeyError, ValueError) as error:
-        raise DataError(f"{recording} is not a recording of circles: {error}") from error
-    count = min(len(angle_deg), circles * 200)
-    spacing_m = float(np.median(bin_m))
+def tank_capture(circles: Circles) -> tuple[bytes, float]:
+    """Encode beams as the frames that a head sends; return them and the sound speed that fits the bins."""
+    interval = round(2.0 * circles.bin_m / (_USUAL_SPEED_M_S * _TICK_S))
     frames = [
         encode_head_data(
             HeadData(
-                bearing=round(float(angle_deg[index]) / 360 * _UNITS + _UNITS / 2) % _UNITS,
-                bins=echoes[index].astype(np.uint8).tobytes(),
-                ad_interval=AD_INTERVAL,
-                step=32,
+                bearing=round(bearing_rad / math.tau * _UNITS + _UNITS / 2) % _UNITS,
+                bins=echoes.tobytes(),
+                ad_interval=interval,
+                step=round(_UNITS / circles.beams),
                 left_limit=0,
                 right_limit=0,
-                range_scale=round(spacing_m * echoes.shape[1] * 10),
+                range_scale=round(circles.bin_m * len(echoes) * 10),
                 control=USUAL_CONTROL | Control.CONTINUOUS,
             )
         )
-        for index in range(count)
+        for bearing_rad, echoes in zip(circles.bearing_rad.tolist(), circles.echoes, strict=True)
     ]
-    return b"".join(frames), 2 * spacing_m / (AD_INTERVAL * _TICK_S)
+    return b"".join(frames), 2.0 * circles.bin_m / (interval * _TICK_S)
 
 
-def map_tank(recording: Path, folder: Path, circles: int) -> Grid:
-    """Import and replay a recording in ``folder``, heading constant, and return the measured map as it was written."""
-    capture, sound_speed_m_s = tank_capture(recording, circles)
+def map_tank(circles: Circles, folder: Path) -> Grid:
+    """Import and replay circles in ``folder``, heading constant, and return the measured map as it was written."""
+    capture, sound_speed_m_s = tank_capture(circles)
+    range_m = circles.bin_m * circles.echoes.shape[1]
     folder.mkdir(parents=True, exist_ok=True)
     raw, log, config = folder / "tank.bin", folder / "tank.mcap", folder / "tank.toml"
     raw.write_bytes(capture)
-    config.write_text(f'[site]\nname = "tank"\n[sonar]\nrange_m = 5.0\nsound_speed_m_s = {sound_speed_m_s:.3f}\n')
+    sonar = f"[sonar]\nrange_m = {range_m:.1f}\nsound_speed_m_s = {sound_speed_m_s:.3f}\n"
+    config.write_text(f'[site]\nname = "tank"\n{sonar}')
     run_command(import_log, [str(raw), "-o", str(log), "--config", str(config)])
     run_command(replay, [str(log), "-o", str(folder / "map")])
     return read_map(folder / "map" / "map.yaml").grid
@@ -108,11 +102,11 @@ def judge_tank(grid: Grid, circles: int) -> TankFigures:
     )
 
 
-def measure(data: Path, circles: int) -> TankFigures:
-    """Figures of the first circles of the recording (14 in all) in the folder of recordings ``data``."""
+def measure(circles: Circles) -> TankFigures:
+    """Map circles of a recording and judge the map."""
     with tempfile.TemporaryDirectory(prefix="lacuna-tank-") as folder:
-        grid = map_tank(data / "sonar" / "micron-tank-14scans.npz", Path(folder), circles)
-    return judge_tank(grid, circles)
+        grid = map_tank(circles, Path(folder))
+    return judge_tank(grid, circles.count)
 
 
 def _left_of(
