@@ -28,6 +28,9 @@ _BENDABLE: Final = 16  # cells of centre line from which a bend can be told
 _CLEARLY: Final = 0.5
 _EVEN: Final = 0.5  # cells off the parabola: more is a corner
 _SPUR_ROUNDS: Final = 2
+_DOT: Final = 3  # cells: less has no length
+_MOST_TIPS_OF_ONE: Final = 1000
+_MOST_TIPS: Final = 6000  # of the largest walls: in the largest real maps there are 2,200
 _SOLID: Final = 8.0  # cells from the nearest water: deeper is not wall but the ground behind it
 
 
@@ -67,17 +70,33 @@ class Walls:
     ends: tuple[End, ...]
 
 
-def find_walls(mask: NDArray[np.bool_]) -> Walls:
-    """Find the walls in ``mask`` ``(rows, cols)`` and their true ends, in order of row and column."""
+def find_walls(mask: NDArray[np.bool_], corner: tuple[int, int] = (0, 0)) -> Walls:
+    """Find the walls in ``mask`` ``(rows, cols)`` and their true ends, in order of row and column.
+
+    ``corner`` is the mask's first cell: an end is the same to the byte from whichever part of a grid it was found in.
+    """
     half = _depths(mask)
     wall = half > 0
     label = np.zeros(wall.shape, np.int32)
     ndimage.label(wall, EIGHT, output=label)
     lines = CentreLines(np.asarray(skeletonize(wall), np.bool_))  # type: ignore[no-untyped-call]
-    lines.prune(half)
+    promising = _promising(lines.tips(wall), label)[label]
+    lines.prune(half, promising)
     inner = slice(1, -1), slice(1, -1)
-    kept = tuple(end for end in (_end(at, lines, half, label) for at in lines.tips()) if end is not None)
+    found = (_end(at, lines, half, label, corner) for at in lines.tips(promising))
+    kept = tuple(end for end in found if end is not None)
     return Walls(wall[inner], label[inner], half[inner], lines.mask()[inner], kept)
+
+
+def _promising(tips: list[int], label: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """Tell for each label whether its wall may have ends: dots have none, and what is all tips is noise, no wall."""
+    size = np.bincount(label.ravel())
+    count = np.bincount(label.ravel()[tips], minlength=len(size))
+    sane = (size >= _DOT) & (count <= _MOST_TIPS_OF_ONE)
+    largest = np.argsort(np.where(sane, -size, 0), kind="stable")
+    taken = np.cumsum(np.where(sane, count, 0)[largest])
+    sane[largest[taken > _MOST_TIPS]] = False
+    return sane
 
 
 def _depths(mask: NDArray[np.bool_]) -> NDArray[np.float32]:
@@ -104,17 +123,19 @@ class CentreLines:
         """Return the lines as a layer."""
         return self._mask
 
-    def tips(self) -> list[int]:
-        """Cells with one neighbour or none, in order."""
-        around = ndimage.correlate(self._mask.view(np.int8), EIGHT, mode="constant") - 1
-        return np.flatnonzero(self._mask & (around <= 1)).tolist()
+    def tips(self, of: NDArray[np.bool_]) -> list[int]:
+        """Cells of a layer with one neighbour or none, in order."""
+        cells = np.flatnonzero(self._mask & of)
+        around = np.sum([self._mask.ravel()[cells + step] for step in self._steps], axis=0)
+        tips: list[int] = cells[around <= 1].tolist()
+        return tips
 
-    def prune(self, half: NDArray[np.float32]) -> None:
-        """Remove spurs: branches that do not leave the thickness of the wall they stand on."""
+    def prune(self, half: NDArray[np.float32], of: NDArray[np.bool_]) -> None:
+        """Remove spurs of a layer: branches that do not leave the thickness of the wall they stand on."""
         thick = half.ravel()
         longest = int(half.max(initial=0.0)) + 3
         for _ in range(_SPUR_ROUNDS):
-            for at in self.tips():
+            for at in self.tips(of):
                 path, branches = self.follow(at, longest)
                 if branches and len(path) <= thick[path[-1]] + 1.0:
                     self._cells.difference_update(path[:-1])
@@ -133,10 +154,10 @@ class CentreLines:
             path.append(ahead[0])
         return path, False
 
-    def places(self, path: list[int]) -> NDArray[np.float64]:
+    def places(self, path: list[int]) -> NDArray[np.int64]:
         """Return x and y ``(n, 2)`` of cells, without the border."""
         rows, cols = np.divmod(np.array(path), self._width)
-        return np.stack([cols, rows], axis=1) - 1.0
+        return np.stack([cols, rows], axis=1) - 1
 
     def _around(self, at: int) -> list[int]:
         """Neighbours, straight ones first: of two side by side the diagonal one is not a branch."""
@@ -150,24 +171,28 @@ class CentreLines:
         return all(abs(other - row) <= 1 and abs(across - col) <= 1 for other, across in places)
 
 
-def _end(at: int, lines: CentreLines, half: NDArray[np.float32], label: NDArray[np.int32]) -> End | None:
+def _end(
+    at: int, lines: CentreLines, half: NDArray[np.float32], label: NDArray[np.int32], corner: tuple[int, int]
+) -> End | None:
     path, _ = lines.follow(at, 2 * SUPPORT)
     thick = float(np.sort(half.ravel()[path])[len(path) // 2]) - 0.5
     if len(path) < 3 or len(path) + thick < 2.5 * thick + 2.0:
         return None
-    line = smooth(lines.places(path))
-    tip, out, wander = direction(line)
-    reach = _to_edge(tip + 1.0, out, half)
-    x, y = tip + out * reach
+    places = lines.places(path)
+    line = smooth(places - places[0])  # from the tip, so that nothing hangs on where the grid begins
+    foot, out, wander = direction(line)
+    reach = _to_edge(foot, out, half, places[0] + 1)
     steps = line[1:] - line[:-1]
     length = float(np.hypot(steps[:, 0], steps[:, 1]).sum()) + reach
-    return End(float(x), float(y), float(out[0]), float(out[1]), thick, line, length, wander, int(label.flat[at]))
+    first = places[0] + corner[::-1]
+    x, y = (foot + out * reach + first).tolist()
+    return End(x, y, float(out[0]), float(out[1]), thick, line + first, length, wander, int(label.flat[at]))
 
 
-def smooth(line: NDArray[np.float64]) -> NDArray[np.float64]:
+def smooth(line: NDArray[np.int64]) -> NDArray[np.float64]:
     """Take the stairs out of a line of cells ``(n, 2)``: a running mean over three, ends kept."""
     if len(line) < 3:
-        return line
+        return line.astype(np.float64)
     inner = (line[:-2] + line[1:-1] + line[2:]) / 3.0
     return np.concatenate([line[:1], inner, line[-1:]])
 
@@ -211,12 +236,14 @@ def _bend(along: NDArray[np.float64], aside: NDArray[np.float64]) -> NDArray[np.
     return np.asarray(bend, np.float64) if after < min(_CLEARLY * before, _EVEN) else None
 
 
-def _to_edge(tip: NDArray[np.float64], out: NDArray[np.float64], half: NDArray[np.float32]) -> float:
-    """How far the wall still goes on from the tip of its centre line."""
+def _to_edge(
+    foot: NDArray[np.float64], out: NDArray[np.float64], half: NDArray[np.float32], origin: NDArray[np.int64]
+) -> float:
+    """How far the wall still goes on from the foot of its axis, which is told from ``origin``, a cell (x, y)."""
     steps = 0
     while steps < 2 * _SOLID:
-        x, y = tip + out * (0.5 * (steps + 1))
-        row, col = round(y), round(x)
+        x, y = foot + out * (0.5 * steps + 0.25)  # never on the border of two cells of a straight wall
+        row, col = round(y) + origin[1], round(x) + origin[0]
         if not (0 <= row < half.shape[0] and 0 <= col < half.shape[1]) or half[row, col] <= 0:
             break
         steps += 1
