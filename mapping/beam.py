@@ -38,7 +38,13 @@ FINE_RAD = math.radians(0.3)
 JOIN_M = 0.12
 """Neighbouring returns are one wall where their ranges differ by no more than this ..."""
 JOIN_SLOPE = 2.5
-"""... or by this times the arc between them (68 degrees of incidence)."""
+"""... or by this times the arc between them (68 degrees of incidence) ..."""
+LEAST_SQUARE = 0.2
+"""A wall is not taken to be met at more of a slant than this cosine of incidence."""
+JOIN_STEEPEST = 5.0
+"""... or by this times it (79 degrees), where they lie on a straight line with the return before or after ..."""
+JOIN_BENT = 0.25
+"""... but for this share of their difference."""
 SPREAD = 0.08
 """Share of the arc within the beam by which an oblique wall's range is unsure."""
 
@@ -53,11 +59,15 @@ class PolarEvidence:
 
 @dataclass(frozen=True, slots=True)
 class Fan:
-    """Returns in fine bearings, ``(n,)`` float64 each: nan ranges and zero free water where nothing is said."""
+    """Returns in fine bearings, ``(n,)`` float64 each: nan ranges and zero free water where nothing is said.
+
+    ``square`` is the cosine of the incidence at which a wall is met, 1 where it is not known.
+    """
 
     range_m: NDArray[np.float64]
     sd_m: NDArray[np.float64]
     free_m: NDArray[np.float64]
+    square: NDArray[np.float64]
 
 
 def spread(bearing_rad: NDArray[np.float64], returns: Returns, step_rad: float, beam_rad: float) -> Fan:
@@ -78,8 +88,7 @@ def spread(bearing_rad: NDArray[np.float64], returns: Returns, step_rad: float, 
     off = np.minimum(share, 1.0 - share) * gap
     covered = off <= max(0.5 * beam_rad, 0.55 * step_rad)
     z, sd, free = returns.range_m[order], returns.sd_m[order], returns.free_m[order]
-    arc = np.fmin(z[left], z[right]) * gap
-    joined = (np.abs(z[right] - z[left]) <= np.maximum(JOIN_M, JOIN_SLOPE * arc)) & (gap < 2.5 * step_rad)
+    joined = _goes_on(z, bearing)[left] & (gap < 2.5 * step_rad)
     range_m = np.where(joined, 1.0 / ((1.0 - share) / z[left] + share / z[right]), z[nearest])
     slope = np.where(joined, np.abs(z[right] - z[left]) / np.maximum(gap, 1e-9), 0.0)
     fan_sd = np.hypot(np.where(joined, np.fmax(sd[left], sd[right]), sd[nearest]), SPREAD * beam_rad * slope)
@@ -89,7 +98,21 @@ def spread(bearing_rad: NDArray[np.float64], returns: Returns, step_rad: float, 
         np.where(covered, range_m, np.nan),
         np.where(covered, fan_sd, np.nan),
         np.where(covered, fan_free, 0.0),
+        np.nan_to_num(range_m / np.hypot(range_m, slope), nan=1.0),
     )
+
+
+def _goes_on(range_m: NDArray[np.float64], bearing_rad: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Whether each beam and the next see one wall, ``(n,)``; beams in order of bearing."""
+    after = np.roll(range_m, -1)
+    gap = np.roll(bearing_rad, -1) - bearing_rad
+    gap %= 2.0 * math.pi
+    step_m, arc = np.abs(after - range_m), np.fmin(range_m, after) * gap
+    # Along a straight wall the curvature of 1 / range is -1 / range.
+    bend = np.roll(1.0 / range_m, 1) - 2.0 / range_m + 1.0 / after + (gap / range_m) * gap
+    bent_m = np.abs(bend) * range_m * np.fmin(range_m, after)
+    straight = np.fmin(bent_m, np.roll(bent_m, -1)) < JOIN_BENT * step_m
+    return np.asarray((step_m <= np.maximum(JOIN_M, JOIN_SLOPE * arc)) | (straight & (step_m <= JOIN_STEEPEST * arc)))
 
 
 def polar_evidence(scan: Scan, returns: Returns, beam_rad: float, cell_m: float) -> PolarEvidence:
@@ -104,18 +127,18 @@ def polar_evidence(scan: Scan, returns: Returns, beam_rad: float, cell_m: float)
     hinted = np.isfinite(fan.range_m) & ~drawn & (fan.sd_m < BLIND_SD_M)
     heard_m = float(np.max(np.concatenate([fan.range_m[drawn | hinted], fan.free_m, [cell_m]])))
     ranges = (np.arange(math.ceil((heard_m + 8.0 * cell_m) / step_m)) + 0.5) * step_m
-    sd = np.hypot(np.nan_to_num(fan.sd_m), PLACE_SD_M)
-    clear_m = np.where(drawn, fan.range_m - 4.0 * sd - cell_m, np.fmin(fan.free_m, fan.range_m - 2.0 * sd))
+    sd, square = np.hypot(np.nan_to_num(fan.sd_m), PLACE_SD_M), np.maximum(fan.square, LEAST_SQUARE)
+    clear_m = np.where(drawn, fan.range_m - 4.0 * sd - cell_m / square, np.fmin(fan.free_m, fan.range_m - 2.0 * sd))
     log_odds = np.where(ranges < clear_m[:, None], FREE_LOG_ODDS, 0.0).astype(np.float32)
     vague = hinted[:, None] & (np.abs(ranges - fan.range_m[:, None]) < fan.sd_m[:, None]) & (log_odds == 0.0)
     log_odds[vague] = VAGUE_LOG_ODDS
     faces = np.flatnonzero(drawn)
-    far_m = fan.range_m[faces] + 4.0 * sd[faces] + 2.0 * cell_m + BACK_M
+    far_m = fan.range_m[faces] + 4.0 * sd[faces] + (2.0 * cell_m + BACK_M) / square[faces]
     first, last = np.searchsorted(ranges, clear_m[faces]), np.searchsorted(ranges, far_m)
     at = first[:, None] + np.arange(int((last - first).max(initial=0)))
     row, column = np.nonzero(at < last[:, None])
     fine, at = faces[row], at[row, column]
-    log_odds[fine, at] = of_face(ranges[at] - fan.range_m[fine], sd[fine], cell_m)
+    log_odds[fine, at] = of_face((ranges[at] - fan.range_m[fine]) * square[fine], sd[fine] * square[fine], cell_m)
     return PolarEvidence(log_odds, step_m)
 
 

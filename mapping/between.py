@@ -35,6 +35,8 @@ BESIDE_M: Final = 0.06
 """... in beams that have an echo within this of its line ..."""
 ASIDE_M: Final = 0.12
 """... and of which the line through the beams lies within this of it."""
+LEAST_SQUARE: Final = 0.6
+"""... both across the wall, which is met at no more of a slant than this cosine of incidence."""
 FIRM_OF: Final = 4
 FIRM_LEAST: Final = 3
 FIRM_M: Final = 0.04
@@ -109,14 +111,21 @@ def continued_m(seen: Seen, excess: Floats, sure: NDArray[np.bool_], wall: Float
         there = np.where(at >= 0, (at + 0.5) * frame.bin_m - frame.longer_m, np.nan)
         base_m, turn = seen.range_m[side], seen.bearing_rad - seen.bearing_rad[side]
         apart = np.hypot(met * np.sin(turn), met * np.cos(turn) - base_m)
+        square = np.maximum(met_square(seen.bearing_rad, wall[side]), LEAST_SQUARE)
         on = (
-            (np.abs(there - met) < BESIDE_M)
-            & (np.abs(seen.range_m - met) < ASIDE_M)
+            (np.abs(there - met) * square < BESIDE_M)
+            & (np.abs(seen.range_m - met) * square < ASIDE_M)
             & (met < inner)
             & (apart < nearest)
         )
         found, nearest = np.where(on, met, found), np.where(on, apart, nearest)
     return found
+
+
+def met_square(bearing_rad: Floats, wall: Floats) -> Floats:
+    """Cosine ``(n,)`` of the incidence at which beams meet walls ``(n, 2)``."""
+    towards = wall[:, 0] * np.sin(bearing_rad) + wall[:, 1] * np.cos(bearing_rad)
+    return np.asarray(towards / np.maximum(np.hypot(wall[:, 0], wall[:, 1]), 1e-9))
 
 
 def firm(seen: Seen, sure: NDArray[np.bool_], wall: Floats, *, closed: bool) -> NDArray[np.bool_]:

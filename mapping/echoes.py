@@ -32,6 +32,9 @@ ROUGH_M: Final = 0.12
 """Second difference of the range from beam to beam beyond which a beam abstains."""
 WIDE_M: Final = 0.35
 """A beam with more than this at the level of its peak, less 6 dB, has no clear place: a corner, or noise."""
+OWN: Final = 0.9
+"""An echo that side lobes of a louder one beside it explain nearly (``mapping.clutter``) may be no wall: a doorway's
+edges close it with rings."""
 SHORT_M: Final = 0.3
 SHORT_RAD: Final = math.radians(45.0)
 """A wall of which less than this is seen without a break, in length and in angle, is no wall."""
@@ -54,11 +57,15 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True)
 class Beams:
-    """A scan's beams in order of bearing: ``echoes`` without ringing, and ``excess`` above all that is no wall."""
+    """A scan's beams in order of bearing: ``echoes`` without ringing, and ``excess`` above all that is no wall.
+
+    ``own`` ``(n, bins)`` is less than 1 where side lobes may explain an echo (``mapping.clutter``).
+    """
 
     bearing_rad: Floats
     echoes: Floats
     excess: Floats
+    own: Floats
     floor: Floats
     bin_m: float
     step_rad: float
@@ -130,11 +137,12 @@ def beams_of(scan: Scan, order: NDArray[np.intp], config: Map, *, closed: bool) 
     smooth = smoothed(echoes, scan.bin_m)
     floor = floor_of(smooth, scan.bin_m)
     excess = smooth - floor - rings_of(smooth, scan.bin_m)
-    excess = np.where(excess > 0.0, excess * lobe_weights(smooth, scan.step_rad, closed=closed), excess)
+    own = lobe_weights(smooth, scan.step_rad, closed=closed)
+    excess = np.where(excess > 0.0, excess * own, excess)
     bearing = scan.bearing_rad[order]
     width, height = math.radians(config.beam_deg) / 2.0, math.radians(config.beam_vertical_deg) / 2.0
     return Beams(
-        bearing, echoes, excess, floor, scan.bin_m, scan.step_rad, closed, width, height, deaf_m(raw, scan.bin_m)
+        bearing, echoes, excess, own, floor, scan.bin_m, scan.step_rad, closed, width, height, deaf_m(raw, scan.bin_m)
     )
 
 
@@ -174,9 +182,14 @@ def judge(beams: Beams, at: NDArray[np.intp], range_m: Floats, joined: Flags, la
         bend[[0, -1]] = 0.0
     wide = width_of(beams.excess, at) * beams.bin_m > WIDE_M + 2.0 * late
     heard = joined & (around > FAINT) & (bend < 2.0 * ROUGH_M + late)
-    sure = heard & (bend < ROUGH_M + late) & ~wide
+    sure = heard & (bend < ROUGH_M + late) & ~wide & ~of_lobes(beams, at)
     sure &= long_enough(sure, range_m, beams.step_rad, closed=beams.closed)
     return heard & long_enough(heard, range_m, beams.step_rad, closed=beams.closed), sure
+
+
+def of_lobes(beams: Beams, at: NDArray[np.intp]) -> Flags:
+    """Whether side lobes explain the echoes at the bins ``at``, ``(n,)``; within the ringing nothing tells."""
+    return np.asarray((beams.own[np.arange(len(at)), at] < OWN) & ((at + 0.5) * beams.bin_m > beams.deaf_m))
 
 
 def squareness(beams: Beams, range_m: Floats) -> Floats:

@@ -110,3 +110,21 @@ def test_the_contour_prefers_the_unbroken_line_to_louder_specks() -> None:
     contour = trace(excess, 0.02, STEP_RAD, closed=True)
     assert (contour.bins == 50).all()
     assert contour.joined.all()
+
+
+def test_side_lobes_of_a_doorways_edges_do_not_shut_it() -> None:
+    scan = scan_of(RECTANGLE)
+    bearing = np.degrees(scan.bearing_rad)
+    wall_m = np.where(np.abs(bearing - 180.0) < 25.0, 2.0, 2.6 + 0.6 * np.cos(2.0 * scan.bearing_rad + math.pi))
+    within = np.maximum(18.0 - np.abs(bearing - 180.0), 0.0)  # degrees into a doorway, 36 degrees wide
+    loud = 150.0 - np.where(within > 0.0, 40.0 + 1.0 * within, 0.0)
+    behind = np.where(within > 0.0, 45.0, 0.0)
+    bins = (np.arange(BINS) + 0.5) * BIN_M
+    level = np.maximum(
+        loud[:, None] - 7.0 * ((bins - wall_m[:, None]) / 0.06) ** 2, behind[:, None] - 7.0 * ((bins - 4.5) / 0.06) ** 2
+    )
+    noise = np.random.default_rng(3).normal(20.0, 6.0, (200, BINS))
+    returns = pick(replace(scan, echoes=np.clip(np.maximum(level, noise), 0, 255).astype(np.uint8)), Map())
+    sure = returns.sd_m < VAGUE_SD_M
+    assert not (sure & (within > 12.0) & (np.abs(returns.range_m - 2.0) < 0.3)).any()
+    assert np.mean(sure[within == 0.0]) > 0.8

@@ -165,3 +165,12 @@ def test_water_between_vague_beams_is_open_no_further_than_they_say() -> None:
     half = len(fan.free_m) // 2
     assert fan.free_m[10 : half - 10].min() > 2.99
     assert fan.free_m[half + 10 : -10].max() <= 1.0
+
+
+def test_a_wall_met_at_a_slant_is_drawn_as_thick_as_one_met_squarely() -> None:
+    corridor = np.array([[-9.0, -0.7], [-9.0, 0.7], [9.0, 0.7], [9.0, -0.7]])
+    evidence = evidence_of(corridor, sd_m=0.06)  # along a range that the slant stretches, little across the wall
+    walls = cells(grids.render([(Pose(0.0, 0.0, 0.0), evidence)], Map()), OCCUPIED)
+    aslant = walls[(np.abs(walls[:, 0]) > 1.6) & (np.abs(walls[:, 0]) < 3.0)]
+    assert len(np.unique(np.round(aslant[:, 0], 2))) > 0.9 * 2.8 / 0.05
+    assert np.abs(np.abs(aslant[:, 1]) - 0.7).max() < 0.08
