@@ -8,7 +8,7 @@ import pytest
 from config.errors import UsageError
 from tools.bench.align import align, angle_between
 from tools.bench.rectangle import fit_rectangle
-from tools.bench.walls import distance_to_walls_m, walls_in_view_m
+from tools.bench.walls import distance_to_walls_m, in_view, sampled
 from tools.cli import main
 
 SQUARE = (np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]]), True)
@@ -61,11 +61,12 @@ def test_distance_to_walls() -> None:
 
 def test_a_wall_behind_a_wall_is_not_in_view() -> None:
     screen = (np.array([[1.0, 1.0], [3.0, 1.0]]), False)
-    seen = walls_in_view_m([SQUARE, screen], np.array([[2.0, 3.0]]), 10.0)
+    points_m = sampled([SQUARE, screen])
+    seen = points_m[in_view(points_m, [SQUARE, screen], np.array([2.0, 3.0]), 10.0)]
     south = seen[np.isclose(seen[:, 1], 0.0)]
     assert len(seen) > 200
     assert np.all((south[:, 0] < 0.51) | (south[:, 0] > 3.49))
-    assert not len(walls_in_view_m([SQUARE], np.array([[2.0, 2.0]]), 1.0))
+    assert not in_view(sampled([SQUARE]), [SQUARE], np.array([2.0, 2.0]), 1.0).any()
 
 
 def test_an_unknown_bench_is_refused(capsys: pytest.CaptureFixture[str]) -> None:

@@ -14,9 +14,9 @@ from config.schema import Config, Feed, Site
 from daemon.pipeline import Pipeline
 from daemon.state import MapState
 from drivers.records import Chunk, Record
-from mapping.values import OCCUPIED, Station
+from mapping.values import Station
 from tools.bench.align import Alignment, align, angle_between
-from tools.bench.walls import distance_to_walls_m, walls_in_view_m
+from tools.bench.leaning import WallFigures, judge_walls, plans_of
 from tools.emulator.dive import Dive, DiveOptions
 from tools.emulator.record import record
 from tools.emulator.site import SITES
@@ -43,7 +43,8 @@ class TruthFigures:
 
     ``stray`` counts placed stations that were made while the vehicle was under way.  ``covered`` is the share of placed
     stations within their stated 95 % ellipse about the origin's true place; ``across_max_m`` the greatest error across
-    a passage, nan at sites that are none; ``sd_max_m`` the widest ellipse that was stated.
+    a passage, nan at sites that are none; ``sd_max_m`` the widest ellipse that was stated.  Walls are judged level by
+    level and counted together (``tools.bench.leaning``).
     """
 
     site: str
@@ -54,6 +55,7 @@ class TruthFigures:
     unplaced: int
     stray: int
     pieces: int
+    levels: int
     wrong: int
     covered: float
     error_median_m: float
@@ -122,7 +124,7 @@ def judge(dive: Dive, state: MapState, config: Config, pilot: str = "steady") ->
     pairs = [(station, rest) for station in placed if (rest := _rest_of(station, rests)) is not None]
     errors, alignment = errors_of(dive, pairs)
     errors_m = np.linalg.norm(errors.fitted_m, axis=1)
-    precision, recall = _walls(dive, state, alignment, config)
+    walls = _walls(dive, state, pairs, (alignment, config.sonar.range_m))
     return TruthFigures(
         site=dive.site.name,
         pilot=pilot,
@@ -132,6 +134,7 @@ def judge(dive: Dive, state: MapState, config: Config, pilot: str = "steady") ->
         unplaced=sum(station.status != "placed" for station in state.stations),
         stray=len(placed) - len(pairs),
         pieces=len({station.piece for station in state.stations}),
+        levels=1 + len(state.levels),
         wrong=int((errors_m > WRONG_M).sum()),
         covered=round(errors.covered, 3),
         error_median_m=round(float(np.median(errors_m)), 4),
@@ -140,8 +143,8 @@ def judge(dive: Dive, state: MapState, config: Config, pilot: str = "steady") ->
         across_max_m=round(float(errors.across_m.max()), 4) if dive.site.name in PASSAGES else nan,
         sd_max_m=round(float(errors.sd_m.max()), 3),
         heading_max_deg=round(float(np.degrees(errors.heading_rad.max())), 3),
-        wall_precision=round(precision, 4),
-        wall_recall=round(recall, 4),
+        wall_precision=round(walls.precision, 4),
+        wall_recall=round(walls.recall, 4),
     )
 
 
@@ -176,21 +179,17 @@ def _rest_of(station: Station, rests: list[Rest]) -> Rest | None:
     return None
 
 
-def _walls(dive: Dive, state: MapState, alignment: Alignment, config: Config) -> tuple[float, float]:
-    grid = state.grid
-    rows, cols = np.nonzero(grid.state == OCCUPIED)
-    cells_m = np.stack([grid.x0_m + (cols + 0.5) * grid.cell_m, grid.y0_m + (rows + 0.5) * grid.cell_m], axis=1)
-    cells_m = alignment.apply(cells_m)
-    lines = [(wall.points_m, wall.closed) for wall in dive.site.walls]
-    within_m = WITHIN_CELLS * grid.cell_m
-    precision = float(np.mean(distance_to_walls_m(cells_m, lines) <= within_m)) if len(cells_m) else 0.0
-    seen_from_m = np.array([[rest.stop.x_m, rest.stop.y_m] for rest in dive.vehicle.rests])
-    in_view_m = walls_in_view_m(lines, seen_from_m, config.sonar.range_m)
-    return precision, _share_near(in_view_m, cells_m, within_m)
-
-
-def _share_near(points_m: NDArray[np.float64], cells_m: NDArray[np.float64], within_m: float) -> float:
-    if not len(points_m) or not len(cells_m):
-        return 0.0
-    nearest = [np.min(np.hypot(*(cells_m - point).T)) for point in points_m]
-    return float(np.mean(np.array(nearest) <= within_m))
+def _walls(
+    dive: Dive, state: MapState, pairs: list[tuple[Station, Rest]], map_: tuple[Alignment, float]
+) -> WallFigures:
+    """Judge the walls of all levels; ``map_`` is the map's alignment and the sonar's range in m."""
+    grids = [state.grid, *(level.grid for level in state.levels)]
+    deeper = [set(level.scans) for level in state.levels]
+    level = [next((1 + k for k, scans in enumerate(deeper) if s.scan.index in scans), 0) for s, _ in pairs]
+    at = [
+        [dive.place_during(rest) for (_, rest), k in zip(pairs, level, strict=True) if k == n]
+        for n in range(len(grids))
+    ]
+    placed = {rest.index for _, rest in pairs}
+    lost = [dive.place_during(rest) for rest in dive.vehicle.rests if rest.index not in placed]
+    return judge_walls(dive.site, plans_of(grids, at, lost), *map_, WITHIN_CELLS)

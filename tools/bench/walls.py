@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 SAMPLE_M: Final = 0.05
 _OWN_WALL: Final = 1e-3
 
-Line = tuple[NDArray[np.float64], bool]
+Floats = NDArray[np.float64]
+Line = tuple[Floats, bool]
 """Points ``(n, 2)`` of a polyline in m, and whether its last point joins the first."""
 
 
-def distance_to_walls_m(points_m: NDArray[np.float64], lines: Sequence[Line]) -> NDArray[np.float64]:
+def distance_to_walls_m(points_m: Floats, lines: Sequence[Line]) -> Floats:
     """Distance ``(n,)`` in m of points ``(n, 2)`` from the nearest wall."""
     starts, ends = _segments(lines)
     along = ends - starts
@@ -27,22 +28,22 @@ def distance_to_walls_m(points_m: NDArray[np.float64], lines: Sequence[Line]) ->
     return nearest
 
 
-def walls_in_view_m(lines: Sequence[Line], seen_from_m: NDArray[np.float64], range_m: float) -> NDArray[np.float64]:
-    """Points ``(n, 2)`` every 5 cm of wall that are in view from one of the places ``(k, 2)``, within ``range_m``."""
+def sampled(lines: Sequence[Line]) -> Floats:
+    """Points ``(n, 2)`` every 5 cm of wall."""
     starts, ends = _segments(lines)
-    samples = np.concatenate([_along(start, end) for start, end in zip(starts, ends, strict=True)])
-    in_view = np.zeros(len(samples), dtype=bool)
-    for place in seen_from_m:
-        near = np.linalg.norm(samples - place, axis=1) <= range_m
-        blocked = np.array(
-            [_is_blocked(place, sample, starts, ends) for sample in samples[near & ~in_view]], dtype=bool
-        )
-        todo = np.nonzero(near & ~in_view)[0]
-        in_view[todo[~blocked]] = True
-    return np.asarray(samples[in_view])
+    return np.concatenate([_along(start, end) for start, end in zip(starts, ends, strict=True)])
 
 
-def _segments(lines: Sequence[Line]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def in_view(samples_m: Floats, lines: Sequence[Line], place_m: Floats, range_m: float) -> NDArray[np.bool_]:
+    """Tell which samples ``(n, 2)`` of walls are in view from a place ``(2,)``, within ``range_m``."""
+    starts, ends = _segments(lines)
+    near = np.linalg.norm(samples_m - place_m, axis=1) <= range_m
+    seen = np.zeros(len(samples_m), dtype=bool)
+    seen[near] = [not _is_blocked(place_m, sample, starts, ends) for sample in samples_m[near]]
+    return seen
+
+
+def _segments(lines: Sequence[Line]) -> tuple[Floats, Floats]:
     starts, ends = [], []
     for points, closed in lines:
         starts.append(points if closed else points[:-1])
@@ -50,15 +51,13 @@ def _segments(lines: Sequence[Line]) -> tuple[NDArray[np.float64], NDArray[np.fl
     return np.concatenate(starts), np.concatenate(ends)
 
 
-def _along(start: NDArray[np.float64], end: NDArray[np.float64]) -> NDArray[np.float64]:
+def _along(start: Floats, end: Floats) -> Floats:
     count = max(1, round(float(np.linalg.norm(end - start)) / SAMPLE_M))
     share = (np.arange(count) + 0.5) / count
     return np.asarray(start + share[:, None] * (end - start))
 
 
-def _is_blocked(
-    place: NDArray[np.float64], sample: NDArray[np.float64], starts: NDArray[np.float64], ends: NDArray[np.float64]
-) -> bool:
+def _is_blocked(place: Floats, sample: Floats, starts: Floats, ends: Floats) -> bool:
     ray, along, apart = sample - place, ends - starts, starts - place
     turn = ray[0] * along[:, 1] - ray[1] * along[:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
