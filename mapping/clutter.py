@@ -1,4 +1,4 @@
-"""What is in the echoes and is no wall: ringing, the floor of noise, rings of constant range, side lobes."""
+"""What is in the echoes and is no wall: ringing, noise, rings of constant range, side lobes, what goes on and on."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 from typing import Final
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
@@ -35,6 +36,13 @@ LOBE_MARGIN_DB: Final = 6.0
 """An echo this far above what side lobes can explain is no side lobe ..."""
 LOBE_WEIGHT: Final = 0.5
 """... and one that they explain counts this much: it may be a faint wall all the same."""
+LASTS_M: Final = (0.4, 2.0)
+"""A wall is followed by its shadow: what is as loud so far behind, from and to, is floor, surface or fine dirt ..."""
+LASTS_PERCENT: Final = 30
+"""... but not what is loud here and there: further bounces."""
+COARSE_M: Final = 0.1
+EDGE_M: Final = 0.2
+"""Behind the last bin it goes on as in so much before it."""
 
 
 def without_ringing(echoes: NDArray[np.float64], bin_m: float, min_range_m: float) -> NDArray[np.float64]:
@@ -77,6 +85,23 @@ def rings_of(smooth: NDArray[np.float64], bin_m: float) -> NDArray[np.float64]:
     walls = float(np.median(smooth.max(axis=1)))
     ring[common > walls - RING_FAINT] = 0.0
     return np.asarray(ring, dtype=np.float64)
+
+
+def lasting(smooth: NDArray[np.float64], floor: NDArray[np.float64], bin_m: float) -> NDArray[np.float64]:
+    """Level ``(n, bins)`` above the floor of noise that each beam keeps up behind a place.
+
+    Along a passage and over a wide floor a beam hears floor and surface from the range on at which it meets them: an
+    edge that looks like a wall, goes with the vehicle, and has no shadow.
+    """
+    n, bins = smooth.shape
+    coarse = max(1, round(COARSE_M / bin_m))
+    first, last = (max(1, round(edge_m / (coarse * bin_m))) for edge_m in LASTS_M)
+    edge = smooth[:, -max(1, round(EDGE_M / bin_m)) :].mean(axis=1, keepdims=True)
+    count = math.ceil(bins / coarse)
+    whole = np.concatenate([smooth, np.repeat(edge, (count + last) * coarse - bins, axis=1)], axis=1)
+    behind = sliding_window_view(whole.reshape(n, -1, coarse).mean(axis=2), last - first + 1, axis=1)[:, first:]
+    level = np.percentile(behind, LASTS_PERCENT, axis=2, method="lower")
+    return np.maximum(np.repeat(level, coarse, axis=1)[:, :bins] - floor, 0.0)
 
 
 def lobe_weights(smooth: NDArray[np.float64], step_rad: float, *, closed: bool) -> NDArray[np.float64]:

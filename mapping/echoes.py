@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from config.schema import Map
 from mapping.between import NEIGHBOUR_RAD, Frame, Seen, continued_m, expected_m, faint_behind, peak_near, sides, veils
-from mapping.clutter import SMOOTH_M, deaf_m, floor_of, lobe_weights, rings_of, smoothed, without_ringing
+from mapping.clutter import SMOOTH_M, deaf_m, floor_of, lasting, lobe_weights, rings_of, smoothed, without_ringing
 from mapping.contour import LOUD, trace
 from mapping.lean import Line, late_m, nearer_m
 from mapping.lines import Fit, fit_walls
@@ -59,13 +59,15 @@ Flags = NDArray[np.bool_]
 class Beams:
     """A scan's beams in order of bearing: ``echoes`` without ringing, and ``excess`` above all that is no wall.
 
-    ``own`` ``(n, bins)`` is less than 1 where side lobes may explain an echo (``mapping.clutter``).
+    ``own`` ``(n, bins)`` is less than 1 where side lobes may explain an echo, and ``ended`` ``(n, bins)`` is ``excess``
+    less what the beam keeps up behind (``mapping.clutter``).
     """
 
     bearing_rad: Floats
     echoes: Floats
     excess: Floats
     own: Floats
+    ended: Floats
     floor: Floats
     bin_m: float
     step_rad: float
@@ -139,17 +141,22 @@ def beams_of(scan: Scan, order: NDArray[np.intp], config: Map, *, closed: bool) 
     excess = smooth - floor - rings_of(smooth, scan.bin_m)
     own = lobe_weights(smooth, scan.step_rad, closed=closed)
     excess = np.where(excess > 0.0, excess * own, excess)
-    bearing = scan.bearing_rad[order]
+    ended = np.minimum(excess, np.maximum(excess - lasting(smooth, floor, scan.bin_m), 0.0))
+    bearing, deaf = scan.bearing_rad[order], deaf_m(raw, scan.bin_m)
     width, height = math.radians(config.beam_deg) / 2.0, math.radians(config.beam_vertical_deg) / 2.0
-    return Beams(
-        bearing, echoes, excess, own, floor, scan.bin_m, scan.step_rad, closed, width, height, deaf_m(raw, scan.bin_m)
-    )
+    return Beams(bearing, echoes, excess, own, ended, floor, scan.bin_m, scan.step_rad, closed, width, height, deaf)
 
 
 def peaks_along(beams: Beams) -> Peaks:
     """Follow the contour, move to the first strong peak next to it, and judge each beam."""
     excess, bin_m, step, closed = beams.excess, beams.bin_m, beams.step_rad, beams.closed
     line = trace(excess, bin_m, step, closed=closed)
+    # Where the line has no shadow behind it, it is the edge of what floor and surface send back, and no wall.
+    goes_on = middle_of_five(beams.ended[np.arange(len(line.bins)), line.bins]) < FAINT
+    if goes_on.any():
+        excess = np.where(goes_on[:, None], beams.ended, excess)
+        beams = replace(beams, excess=excess)
+        line = trace(excess, bin_m, step, closed=closed)
     if closed:
         weights = veils(excess, line.bins, bin_m, step)
         if weights.min() < 1.0:
@@ -176,7 +183,7 @@ def measure(beams: Beams, at: NDArray[np.intp], joined: Flags, late: Floats, nea
 def judge(beams: Beams, at: NDArray[np.intp], range_m: Floats, joined: Flags, late: Floats) -> tuple[Flags, Flags]:
     """Tell which beams are heard, and which of them have a clear place on a line that goes on."""
     level = beams.excess[np.arange(len(at)), at]
-    around = np.median([np.roll(level, k) for k in (-2, -1, 0, 1, 2)], axis=0)
+    around = middle_of_five(level)
     bend = np.abs(np.roll(range_m, 1) - 2.0 * range_m + np.roll(range_m, -1)) * squareness(beams, range_m)
     if not beams.closed:
         bend[[0, -1]] = 0.0
@@ -190,6 +197,11 @@ def judge(beams: Beams, at: NDArray[np.intp], range_m: Floats, joined: Flags, la
 def of_lobes(beams: Beams, at: NDArray[np.intp]) -> Flags:
     """Whether side lobes explain the echoes at the bins ``at``, ``(n,)``; within the ringing nothing tells."""
     return np.asarray((beams.own[np.arange(len(at)), at] < OWN) & ((at + 0.5) * beams.bin_m > beams.deaf_m))
+
+
+def middle_of_five(level: Floats) -> Floats:
+    """Median ``(n,)`` of each beam's level and those of two beams on either side."""
+    return np.asarray(np.median([np.roll(level, k) for k in (-2, -1, 0, 1, 2)], axis=0))
 
 
 def squareness(beams: Beams, range_m: Floats) -> Floats:
