@@ -2,7 +2,7 @@
 
 Two things differ, because this program promises them: fills stay in a layer of their own, and a hole whose fill would
 cross water seen free is left out (``paper_loop.raw_holes`` has it as printed).  A curve that the grid's walls cut into
-pieces becomes a hole a piece.  The paper knows no certainty of a whole hole: the least of its cells stands for it.
+pieces becomes a hole a piece.  What is learnt of a site is told by closed forms (``paper_learning``).  The paper knows no certainty of a whole hole: the least of its cells stands for it.
 """
 
 from __future__ import annotations
@@ -14,8 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from fill.paper_curve import CertaintyCurve, certainty_curves, knock_outs
+from fill.paper_curve import CertaintyCurve, certainty_curves
+from fill.paper_learning import LEARNABLE, learn
 from fill.paper_loop import PaperHole, open_holes
+from fill.paper_segments import find_paths
 from fill.values import Hole
 from mapping.values import OCCUPIED, Grid
 
@@ -28,7 +30,8 @@ def paper_fill(grid: Grid, longest: float, random: np.random.Generator) -> tuple
 
     Returns the holes, and the places ``(n, 2)`` of endpoints left open, x and y in cells.
     """
-    curves = certainty_curves(knock_outs(grid.state == OCCUPIED, random))
+    wall = grid.state == OCCUPIED
+    curves = certainty_curves(learn(find_paths(wall, LEARNABLE), wall, random))
     found, left = open_holes(grid.state, longest)
     pieces = [(hole, piece) for hole in found for piece in _pieces(hole)]
     holes = tuple(_hole(index, hole, piece, curves, grid) for index, (hole, piece) in enumerate(pieces))

@@ -62,6 +62,34 @@ def find_segments(mask: NDArray[np.bool_], shortest: int) -> list[Segment]:
     return found
 
 
+def find_paths(mask: NDArray[np.bool_], shortest: int) -> list[NDArray[np.int64]]:
+    """Return the shortest way from end to end of each such segment: cells ``(n, 2)`` of row and column."""
+    nodes = np.flatnonzero(mask)
+    if not len(nodes):
+        return []
+    part = np.asarray(ndimage.label(mask, _EIGHT)[0], np.int64).ravel()[nodes]
+    graph = _graph(mask, nodes)
+    first = _farthest(_steps(graph, np.unique(part, return_index=True)[1]), part)
+    away, before, _ = dijkstra(
+        graph, directed=False, indices=first, unweighted=True, min_only=True, return_predecessors=True
+    )
+    length = np.asarray(away, np.int64)
+    last = _farthest(length, part)
+    back: list[int] = before.tolist()
+    rows, cols = np.divmod(nodes, mask.shape[1])
+    cells = np.stack([rows, cols], axis=1)
+    return [cells[_walked(int(node), back)] for node in last[length[last] >= shortest]]
+
+
+def _walked(node: int, back: list[int]) -> list[int]:
+    """Nodes from one to where its way began."""
+    path = []
+    while node >= 0:
+        path.append(node)
+        node = back[node]
+    return path
+
+
 def _graph(mask: NDArray[np.bool_], nodes: NDArray[np.int64]) -> csr_array:
     number = np.full((mask.shape[0] + 1, mask.shape[1] + 2), -1, np.int64)
     number[:-1, 1:-1][mask] = np.arange(len(nodes))

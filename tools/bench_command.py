@@ -17,6 +17,7 @@ from tools.bench import (
     acquisition,
     beams,
     circles,
+    fill_large,
     fill_times,
     holes,
     holes_maps,
@@ -112,7 +113,7 @@ def _acquisition(args: argparse.Namespace) -> Iterator[Row]:
 
 
 def _fill(args: argparse.Namespace) -> Iterator[Row]:
-    for figure in fill_times.measure(args.seed):
+    for figure in (*fill_times.measure(args.seed), *fill_large.measure(args.seed)):
         yield figure.row()
 
 

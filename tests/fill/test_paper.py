@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from fill.paper import paper_fill
-from fill.paper_curve import CertaintyCurve, Tally, certainty_curves, knock_outs
+from fill.paper_curve import CertaintyCurve, certainty_curves
 from fill.paper_fit import best_fit, crossed, fit
+from fill.paper_learning import LEARNABLE, Tally, learn
 from fill.paper_loop import open_holes, raw_holes
-from fill.paper_segments import find_segments
+from fill.paper_segments import find_paths, find_segments
 from mapping.values import FREE, OCCUPIED, UNKNOWN, Grid
 
 State = NDArray[np.uint8]
@@ -81,19 +82,52 @@ def test_an_open_door_is_walled_up_as_printed_and_left_open_by_the_program() -> 
     assert all(np.all(state[hole.cells[:, 0], hole.cells[:, 1]] == UNKNOWN) for hole in holes)
 
 
-def test_knock_outs_of_a_straight_wall_are_all_hits() -> None:
-    wall = np.zeros((30, 80), bool)
-    wall[14:17, 5:75] = True
-    tally = knock_outs(wall, np.random.default_rng(1))
+@pytest.mark.parametrize("upright", [False, True])
+def test_knock_outs_of_a_straight_wall_are_all_hits_whichever_way_it_runs(upright: bool) -> None:
+    wall = np.zeros((80, 80), bool)
+    wall[15, 5:75] = True
+    wall = wall.T if upright else wall
+    tally = learn(find_paths(wall, LEARNABLE), wall, np.random.default_rng(1))
     assert tally.positives == 1.0
-    assert len(tally.hit) > 50
+    assert tally.count.sum() > 1000
     assert np.allclose(certainty_curves(tally)[1].certainty(np.array([0.5, 3.0, 50.0])), 1.0)
 
 
+def test_closed_forms_hit_what_fits_hit() -> None:
+    path = np.stack([np.rint(8.0 * np.sin(np.arange(60) / 7.0)) + 20.0, np.arange(60.0) + 4.0], axis=1).astype(np.int64)
+    wall = np.zeros((40, 70), bool)
+    wall[path[:, 0], path[:, 1]] = True
+    tally = learn([path], wall, np.random.default_rng(1))
+    count, hits = 0, np.zeros(3, np.int64)
+    for size in range(3, 20):
+        for start in range(len(path) - 20 - size + 1):
+            seen = np.r_[start : start + 10, start + 10 + size : start + 20 + size]
+            missed = np.arange(start + 10, start + 10 + size)
+            count += size
+            for order in (1, 2, 3):
+                row, col = (np.rint(np.polyval(np.polyfit(seen, path[seen, at], order), missed)) for at in (0, 1))
+                hits[order - 1] += wall[row.astype(np.int64), col.astype(np.int64)].sum()
+    assert tally.count.sum(axis=1).tolist() == [count] * 3
+    assert np.all(np.abs(tally.hits.sum(axis=1) - hits) <= 0.01 * count)  # halves are rounded either way
+
+
+def test_ways_from_end_to_end_are_the_shortest() -> None:
+    mask = np.zeros((12, 20), bool)
+    mask[2:4, 3:15] = True
+    mask[2:9, 14] = True
+    mask[2, 10] = False
+    (path,) = find_paths(mask, 4)
+    assert len(path) == find_segments(mask, 4)[0].length + 1
+    assert np.abs(np.diff(path, axis=0)).max() == 1
+    assert mask[path[:, 0], path[:, 1]].all()
+
+
 def test_the_curve_is_held_beyond_its_last_bin_and_kept_within_0_and_1() -> None:
-    away = np.repeat(np.arange(5) + 0.5, 20)
-    hit = np.tile(np.arange(20), 5) < np.repeat([20, 18, 12, 9, 2], 20)
-    curve = certainty_curves(Tally(np.full(100, 2), away, hit))[2]
+    count = np.tile([0, 0, 0, 0, 0, 0], (3, 1))
+    count[1, :5] = 20
+    hits = np.zeros_like(count)
+    hits[1, :5] = [20, 18, 12, 9, 2]
+    curve = certainty_curves(Tally(count, hits))[2]
     beyond = curve.certainty(np.array([4.5, 10.0, 100.0]))
     assert np.all(beyond == beyond[0])
     assert curve.certainty(np.array([0.5]))[0] == pytest.approx(1.0, abs=0.05)

@@ -15,13 +15,14 @@ from skimage.restoration import inpaint_biharmonic
 from config.schema import Fill
 from fill.filler import Filler
 from fill.paper import cell_certainty, paper_fill
-from fill.paper_curve import certainty_curves, knock_outs
+from fill.paper_curve import certainty_curves
 from fill.paper_loop import raw_holes
 from fill.segments import find_walls
 from mapping.values import FREE, OCCUPIED, UNKNOWN, Grid
 from tools.bench.holes_diffusion import diffusion
 from tools.bench.holes_judge import Proposal
 from tools.bench.holes_loss import LONGEST
+from tools.bench.holes_printed import knock_outs
 
 State = NDArray[np.uint8]
 Method = Callable[[State], Proposal]

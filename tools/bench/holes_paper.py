@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from fill.paper_curve import knock_outs
 from mapping.values import FREE, OCCUPIED, UNKNOWN
 from tools.bench.holes_maps import Source, read_state
 from tools.bench.holes_methods import ours, paper_as_printed
+from tools.bench.holes_printed import knock_outs
 from tools.bench.holes_sites import draw_site
 from tools.bench.holes_told import fill_told
 from tools.bench.holes_walk import centre_lines, walk_both_ways
