@@ -2,7 +2,8 @@
 
 Two things differ, because this program promises them: fills stay in a layer of their own, and a hole whose fill would
 cross water seen free is left out (``paper_loop.raw_holes`` has it as printed).  A curve that the grid's walls cut into
-pieces becomes a hole a piece.  What is learnt of a site is told by closed forms (``paper_learning``).  The paper knows no certainty of a whole hole: the least of its cells stands for it.
+pieces becomes a hole a piece.  What is learnt of a site is told by closed forms (``paper_learning``).  The paper knows
+no certainty of a whole hole: the least of its cells stands for it.
 """
 
 from __future__ import annotations
