@@ -23,6 +23,7 @@ from mapping.led import along, led
 from mapping.levels import levels_of
 from mapping.pieces import Pieces
 from mapping.prior import Hint, Prior, agreed
+from mapping.repeats import Repeats
 from mapping.sight import Sight
 from mapping.strides import Strides
 from mapping.swing import is_turned, swung
@@ -46,6 +47,7 @@ class Stations:
     def __init__(self, config: Map) -> None:
         self._config = config
         self._canvas = Canvas(config)
+        self._repeats = Repeats()
         self._pieces = Pieces(math.radians(config.compass_sd_deg), math.radians(config.beam_deg))
         self._charts = Charts(self._pieces, self._canvas, config)
         self._strides = Strides(config)
@@ -106,12 +108,11 @@ class Stations:
         plans = self.plans()
         if not plans:
             return mix(self.grid(), [], np.zeros((DRAWS, 0, 3)))
-        solution = self._pieces.solution(plans[0][0])
-        at = np.array([solution.stations.index(k) for k in plans[0]])
+        drawn = self._fresh(plans[0])
+        solution = self._pieces.solution(drawn[0])
+        at = np.array([solution.stations.index(k) for k in drawn])
         off = draw(solution.covariance, np.random.default_rng([self._config.seed, len(self._sights)]))[:, at]
-        placed = [
-            (self._told[k].pose, self._canvas.cells(self._told[k].pose, self._sights[k].evidence)) for k in plans[0]
-        ]
+        placed = [(self._told[k].pose, self._canvas.cells(self._told[k].pose, self._sights[k].evidence)) for k in drawn]
         return mix(self.grid(), placed, off)
 
     def plans(self) -> list[list[int]]:
@@ -121,7 +122,13 @@ class Stations:
         return [[self._map[k] for k in plan] for plan in levels_of(depths_m, cells, self._config)]
 
     def _draw(self, stations: Sequence[int]) -> Grid:
-        return self._canvas.render([(self._told[k].pose, self._sights[k].evidence) for k in stations])
+        return self._canvas.render([(self._told[k].pose, self._sights[k].evidence) for k in self._fresh(stations)])
+
+    def _fresh(self, stations: Sequence[int]) -> list[int]:
+        """Of stations that show the same speckle from the same place, one: frozen speckle is no second witness."""
+        return [
+            stations[k] for k in self._repeats.fresh([(self._told[s].pose, self._sights[s].scan) for s in stations])
+        ]
 
     def _place(self, i: int) -> Station:
         """Grow the piece that a scan fits, or begin one with it."""
