@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -47,16 +46,17 @@ class Candidate:
 
 def closer_partners(ways: Sequence[Way]) -> list[float]:
     """Return for each way how much nearer than its own the nearest partners of its ends are: logarithms, summed."""
-    nearest: dict[End, float] = {}
-    for way in ways:
-        for end in way.joined:
-            nearest[end] = min(way.chord.gap, nearest.get(end, math.inf))
-    return [_closer(way, nearest) for way in ways]
-
-
-def _closer(way: Way, nearest: dict[End, float]) -> float:
-    gap = max(way.chord.gap, 1.0)
-    return sum(math.log(gap / max(min(nearest[end], gap), 0.5)) for end in way.joined)
+    number: dict[End, int] = {}
+    one = np.array([number.setdefault(way.ends[0], len(number)) for way in ways], np.int64)
+    other = np.array([-1 if way.side else number.setdefault(way.ends[1], len(number)) for way in ways], np.int64)
+    gap = np.array([way.chord.gap for way in ways])
+    nearest = np.full(len(number) + 1, np.inf)
+    np.minimum.at(nearest, one, gap)
+    np.minimum.at(nearest, other, np.where(other >= 0, gap, np.inf))
+    own = np.maximum(gap, 1.0)
+    closer = [np.log(own / np.maximum(np.minimum(nearest[ends], own), 0.5)) for ends in (one, other)]
+    told: list[float] = (closer[0] + np.where(other >= 0, closer[1], 0.0)).tolist()
+    return told
 
 
 def judged(ways: Sequence[Way], scene: Scene, closer: Sequence[float]) -> list[Candidate]:

@@ -100,18 +100,7 @@ def design_of(hole: NDArray[np.float64], cells: NDArray[np.float64]) -> NDArray[
 
 def falling(chance: NDArray[np.float64], away: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the nearest values to ``chance`` ``(n,)`` that do not grow with ``away`` ``(n,)``: means of neighbours."""
-    order = np.lexsort((-chance, away))
-    totals: list[float] = []
-    counts: list[int] = []
-    for value in chance[order].tolist():
-        total, count = value, 1
-        while totals and totals[-1] * count <= total * counts[-1]:
-            total, count = total + totals.pop(), count + counts.pop()
-        totals.append(total)
-        counts.append(count)
-    fallen = np.empty(len(chance))
-    fallen[order] = np.repeat([total / count for total, count in zip(totals, counts, strict=True)], counts)
-    return fallen
+    return all_falling(chance, away, np.array([len(chance)]))
 
 
 def all_falling(
@@ -120,12 +109,19 @@ def all_falling(
     """Let each of several runs of values fall, as ``falling`` does; they lie behind each other, ``counts`` long."""
     run = np.repeat(np.arange(len(counts)), counts)
     order = np.lexsort((-chance, away, run))
-    grows = (np.diff(chance[order]) > 0.0) & (np.diff(run) == 0)
-    fallen = chance.copy()
-    first = np.cumsum(counts) - counts
-    for each in np.unique(run[1:][grows]).tolist():
-        part = slice(first[each], first[each] + counts[each])
-        fallen[part] = falling(chance[part], away[part])
+    totals: list[float] = []
+    members: list[int] = []
+    first, last = 0, -1
+    for value, index in zip(chance[order].tolist(), run.tolist(), strict=True):
+        if index != last:
+            first, last = len(totals), index
+        total, count = value, 1
+        while len(totals) > first and totals[-1] * count <= total * members[-1]:
+            total, count = total + totals.pop(), count + members.pop()
+        totals.append(total)
+        members.append(count)
+    fallen = np.empty(len(chance))
+    fallen[order] = np.repeat(np.array(totals) / np.array(members), members)
     return fallen
 
 

@@ -32,7 +32,6 @@ class Filler:
         self._config = config
         self._prior = prior()
         self._memory = Memory()
-        self._witnesses = Recent()
         self._exams = Recent()
         self._last: Filled | None = None
         self._seen = np.zeros((0, 0), np.uint8)
@@ -54,11 +53,11 @@ class Filler:
         return len(set(places)) == 1 and np.array_equal(self._seen, other.state)
 
     def _chord_fill(self, grid: Grid, longest: float) -> tuple[tuple[Hole, ...], NDArray[np.float64]]:
-        for memory in (self._memory, self._witnesses, self._exams):
+        for memory in (self._memory, self._exams):
             memory.begin()
         closed = close_holes(grid.state, longest, self._prior.hole, memory=self._memory)
         belief = self._school(grid, [each.candidate.gap for each in closed])
-        told = [heard(each, grid.state, self._prior, self._witnesses) for each in closed]
+        told = [heard(each, grid.state, self._prior, self._memory) for each in closed]
         ends = [(each.candidate.start, each.candidate.finish) for each in closed]
         ends_m = places_m(np.array(ends).reshape(-1, 2, 2), grid)
         return tell(closed, told, belief, grid, ends_m), open_ends(grid.state, closed, self._memory)

@@ -92,10 +92,9 @@ def _rivals(live: Sequence[int], found: Sequence[Candidate]) -> dict[int, set[in
         for claim in claimed:
             claims.setdefault(claim, []).append(index)
     rivals: dict[int, set[int]] = {index: set() for index in live}
-    for claimants in claims.values():
-        if len(claimants) > 1:
-            for index in claimants:
-                rivals[index].update(claimants)
+    for claimants in {tuple(each) for each in claims.values() if len(each) > 1}:
+        for index in claimants:
+            rivals[index].update(claimants)
     for index in live:
         rivals[index].discard(index)
     return rivals

@@ -28,7 +28,7 @@ T = TypeVar("T")
 Box = tuple[int, int, int, int]
 """First row and column, and the row and column behind the last."""
 
-_TILE: Final = 4  # cells: changes are noted by tiles of so many
+_TILE: Final = 8  # cells: changes are noted by tiles of so many; as many as bytes in a number of 64 bits
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +99,12 @@ class Memory:
 
     def recall(self, key: Hashable, make: Callable[[], tuple[Basis, T]]) -> T:
         """Return what ``make`` would, which tells what it was made from; what else it needs is ``key``."""
-        return self.recall_all([key], lambda _: [make()])[0]
+        if not self._now:
+            return make()[1]
+        results = self._now[-1].results
+        known = results.get(key) or self._known_before(key) or make()
+        results[key] = known
+        return known[1]  # type: ignore[return-value]
 
     def recall_all(self, keys: Sequence[Hashable], make: Callable[[list[int]], list[tuple[Basis, T]]]) -> list[T]:
         """Return for each key what ``make`` would, which is given the places among ``keys`` of those not known."""
@@ -169,12 +174,13 @@ class _Changes:
 
 def _table(changed: NDArray[np.bool_]) -> list[list[int]] | None:
     """Sum up the changed tiles above and left of each; None where nothing changed."""
-    cells = np.flatnonzero(changed)
-    if not len(cells):
+    if not changed.any():
         return None
-    rows, cols = np.divmod(cells, changed.shape[1])
-    tiles = np.zeros(tuple(size // _TILE + 2 for size in changed.shape), np.int64)
-    tiles[rows // _TILE + 1, cols // _TILE + 1] = 1
+    high, wide = (-(-size // _TILE) for size in changed.shape)
+    whole = np.zeros((high * _TILE, wide * _TILE), bool)
+    whole[: changed.shape[0], : changed.shape[1]] = changed
+    tiles = np.zeros((high + 1, wide + 1), np.int64)
+    tiles[1:, 1:] = whole.view(np.uint64).reshape(high, _TILE, wide).any(axis=1)  # a row of a tile is one number
     table: list[list[int]] = tiles.cumsum(axis=0).cumsum(axis=1).tolist()
     return table
 

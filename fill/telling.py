@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fill.certainty import Belief
 from fill.closing import Closed
-from fill.recent import Recent
+from fill.memory import Basis, Memory
 from fill.values import Hole
 from fill.witness import SEEN, distances, witness
 from mapping.values import Grid
@@ -35,15 +35,11 @@ class Heard:
     beyond: bool
 
 
-def heard(closed: Closed, state: NDArray[np.uint8], belief: Belief, recent: Recent) -> Heard:
+def heard(closed: Closed, state: NDArray[np.uint8], belief: Belief, memory: Memory) -> Heard:
     """Hear the witnesses of one fill, anew only where something about it changed."""
-    low = np.maximum(np.minimum(closed.cells.min(axis=0), closed.candidate.path.min(axis=0)) - _reach(closed), 0)
-    high = np.maximum(closed.cells.max(axis=0), closed.candidate.path.max(axis=0)) + _reach(closed) + 1
-    window = state[low[0] : high[0], low[1] : high[1]]
     rivals = tuple((rival.way, chance) for rival, chance in closed.rivals)
     drawn = closed.candidate.way, closed.candidate.features.tobytes(), closed.cells.tobytes(), closed.chance, rivals
-    key = (tuple(low.tolist()), window.shape, window.tobytes(), drawn)
-    return recent.recall(key, lambda: _hear(closed, state, belief))
+    return memory.recall(("heard", drawn), lambda: (_about(closed), _hear(closed, state, belief)))
 
 
 def tell(
@@ -74,9 +70,12 @@ def _hear(closed: Closed, state: NDArray[np.uint8], belief: Belief) -> Heard:
     return Heard(belief.cell.log_odds(features, cells), distances(closed, cells), belief.cell.excess(features) > 0.0)
 
 
-def _reach(closed: Closed) -> int:
-    """Cells about a fill that its witnesses look at."""
-    return SEEN + int(closed.candidate.gap) + int(max(closed.candidate.half_a, closed.candidate.half_b))
+def _about(closed: Closed) -> Basis:
+    """Tell which cells about a fill its witnesses look at."""
+    reach = SEEN + int(closed.candidate.gap) + int(max(closed.candidate.half_a, closed.candidate.half_b))
+    both = np.concatenate([closed.cells, closed.candidate.path])
+    low, high = (both.min(axis=0) - reach).tolist(), (both.max(axis=0) + reach + 1).tolist()
+    return Basis((low[0], low[1], high[0], high[1]), walls=False)
 
 
 def _parents(closed: Sequence[Closed], shape: tuple[int, ...]) -> list[tuple[int, ...]]:
