@@ -110,6 +110,8 @@ def pick(scan: Scan, config: Map) -> Returns:
         return Returns(np.full(n, np.nan), np.full(n, np.nan), np.zeros(n))
     order, closed = in_order(scan)
     beams = beams_of(scan, order, config, closed=closed)
+    if scan.quality == "moving":  # what corners keep up changes from place to place, but edges go with the vehicle
+        beams = replace(beams, excess=beams.ended)
     peaks = peaks_along(beams)
     free_m = np.where(peaks.sure, peaks.range_m, quiet_water(beams, peaks))
     back = np.empty(n, dtype=np.intp)

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mapping.prior import Hint, Prior
+from mapping.prior import Cloud, Floats, Hint, Prior
 from mapping.register import Match
 from mapping.values import Displacement, Pose
 
@@ -19,6 +19,10 @@ LED_MARGIN, LED_OVERLAP, LED_FIT = 3.0, 0.2, 0.1
 SLIDES = 0.12
 """Information along the weakest axis (0.5 is the most) below which walls are not asked where along it a scan was made:
 wherever smooth walls lie on smooth walls, what differs least is the scan that did not move."""
+WAY_SD_M = 1.0
+"""Where the way tells no more surely than this where a scan was made, it is no place ..."""
+WAY_FIT, WAY_OVERLAP = 0.1, 0.2
+"""... nor where what was seen there does not fit."""
 
 
 def led(moved: Sequence[Displacement | None], turn_rad: float, *, back: bool, reach_m: float) -> Hint | None:
@@ -43,8 +47,29 @@ def along(match: Match, prior: Prior) -> Match:
     axis = np.array([math.sin(match.weak_rad), math.cos(match.weak_rad)])
     short_m = float((np.array([place.x_m, place.y_m]) - [match.pose.x_m, match.pose.y_m]) @ axis)
     x_m, y_m = np.array([match.pose.x_m, match.pose.y_m]) + short_m * axis
-    across = np.eye(3)
-    across[:2, :2] -= np.outer(axis, axis)
-    covariance = across @ match.covariance @ across
+    covariance = _across(match.covariance, axis)
     covariance[:2, :2] += float(axis @ place.covariance @ axis) * np.outer(axis, axis)
     return replace(match, pose=Pose(float(x_m), float(y_m), match.pose.heading_rad), covariance=covariance)
+
+
+def walked(match: Match, cloud: Cloud, trust: float) -> Match:
+    """Put a scan, along the way to it, between where its walls say and where the way alone led.
+
+    ``trust`` is the probability that the walls are right; what both say is told as one normal, across the way as the
+    walls say it.
+    """
+    axis = np.linalg.eigh(cloud.covariance)[1][:, 1]
+    apart_m = float(np.array([cloud.x_m - match.pose.x_m, cloud.y_m - match.pose.y_m]) @ axis)
+    own, told = (float(axis @ each @ axis) for each in (match.covariance[:2, :2], cloud.covariance))
+    x_m, y_m = np.array([match.pose.x_m, match.pose.y_m]) + (1.0 - trust) * apart_m * axis
+    variance = trust * own + (1.0 - trust) * told + trust * (1.0 - trust) * apart_m**2
+    covariance = _across(match.covariance, axis)
+    covariance[:2, :2] += variance * np.outer(axis, axis)
+    return replace(match, pose=Pose(float(x_m), float(y_m), match.pose.heading_rad), covariance=covariance)
+
+
+def _across(covariance: Floats, axis: Floats) -> Floats:
+    """Leave of a covariance ``(3, 3)`` what is not along an axis."""
+    across = np.eye(3)
+    across[:2, :2] -= np.outer(axis, axis)
+    return np.asarray(across @ covariance @ across, dtype=np.float64)

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from config.schema import Map
-from mapping.led import LED_FIT, LED_MARGIN, LED_OVERLAP
-from mapping.prior import Prior
+from mapping.led import LED_FIT, LED_MARGIN, LED_OVERLAP, WAY_FIT, WAY_OVERLAP, WAY_SD_M, walked
+from mapping.prior import Cloud, Prior
 from mapping.register import Match
 from mapping.values import Pose, Scan, Station, Status
 
@@ -21,12 +21,13 @@ ACCEPT = 1.9
 """Log-odds from which a scan counts as placed: no more than one in two hundred is then wrong ..."""
 WIDE = 2.6
 """... where it is of a piece of which the map knows nothing ..."""
-SEEN = 4.5
-"""... where the way was seen, but not surely: what told it little tells little of the place too ..."""
+SEEN = 2.6
+"""... where the way was seen, but not surely: what told it little tells little of the place too; along emulated smooth
+tunnels, where a scan fits best where the vehicle did not move, none has more than -0.5 ..."""
 GAP = 4.5
 """... where neither the scan before nor the one after is placed: pillars repeat, and reach is no bound then ..."""
 LOST = 7.0
-"""... and where the way was followed, and lost: along smooth walls a scan fits best where the vehicle did not move."""
+"""... and where that is so in a piece of which the map knows nothing."""
 STILL, STILL_M = 5.0, 0.6
 """... and where a scan fits best so near to where the one before was made: what travels with the vehicle, ghosts and
 the ends of what it sees, fits there in any tunnel."""
@@ -36,8 +37,6 @@ DOUBT_MARGIN = 3.0
 BAD_OVERLAP, BAD_FIT = 0.35, 0.4
 """Below these the pilot is told that a scan fits badly."""
 ACCEPT_SD_M = 0.3
-SEEN_SD_M = 0.7
-"""Where its cloud is no larger, the way was seen."""
 ASTRAY = 3.0
 """Standard deviations from the way that was seen, from which a scan that fits is not believed."""
 ORIGIN_SD_M = 0.01
@@ -53,6 +52,9 @@ def judge(scan: Scan, match: Match, piece: int, prior: Prior, *, chained: bool) 
     sure = is_led(match) if prior.is_led else fits
     status: Status = "placed"
     if not sure or sd_m > ACCEPT_SD_M or match.astray > ASTRAY:
+        if prior.cloud is not None and is_seen(match, prior.cloud):
+            put = walked(match, prior.cloud, 1.0 / (1.0 + math.exp(-log_odds(match))))
+            return Station(scan, put.pose, put.covariance, "placed", piece, match.margin, _why_walked(put))
         status, piece = "doubtful" if match.margin >= DOUBT_MARGIN else "unplaced", scan.index + 1
     return Station(scan, match.pose, match.covariance, status, piece, match.margin, _why(status, match, sd_m))
 
@@ -75,6 +77,12 @@ def is_led(match: Match) -> bool:
     return match.margin >= LED_MARGIN and match.overlap >= LED_OVERLAP and match.fit >= LED_FIT
 
 
+def is_seen(match: Match, cloud: Cloud) -> bool:
+    """Tell whether the way led to a place, be it less surely along it than walls would tell."""
+    sure = max(cloud.sd_m, _sd_m(match)) <= WAY_SD_M
+    return sure and match.astray <= ASTRAY and match.overlap >= WAY_OVERLAP and match.fit >= WAY_FIT
+
+
 def _sd_m(match: Match) -> float:
     return math.sqrt(float(np.linalg.eigvalsh(match.covariance[:2, :2])[-1]))
 
@@ -93,9 +101,9 @@ def nowhere(scan: Scan, config: Map, why: str) -> Station:
 
 
 def _needed(match: Match, prior: Prior, piece: int, *, chained: bool) -> float:
-    """Log-odds that a match needs: by whether the way was seen, or followed and lost."""
+    """Log-odds that a match needs: by what is known of it otherwise."""
     if prior.cloud is not None:
-        return SEEN if prior.cloud.sd_m <= SEEN_SD_M else LOST
+        return SEEN
     if not chained:
         return LOST if piece > 0 else GAP
     moved_m = math.hypot(match.pose.x_m - prior.x_m, match.pose.y_m - prior.y_m)
@@ -117,3 +125,10 @@ def _why(status: Status, match: Match, sd_m: float) -> str:
     if match.overlap < BAD_OVERLAP or match.fit < BAD_FIT:
         return f"fits badly, {fits}: take a scan nearer to the last one"
     return f"fits nearly as well elsewhere: {fits}; take a scan nearer to the last one, or give a hint"
+
+
+def _why_walked(put: Match) -> str:
+    """One sentence on a scan that the way led to."""
+    long = np.linalg.eigh(put.covariance[:2, :2])[1][:, 1]
+    axis = round(math.degrees(math.atan2(float(long[0]), float(long[1])))) % 180
+    return f"the way there was seen, sd {_sd_m(put):.2f} m along {axis} degrees / {axis + 180} degrees"

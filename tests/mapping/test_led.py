@@ -9,11 +9,14 @@ import numpy as np
 import pytest
 
 from drivers.readings import Odometry
-from mapping.led import LED_SD_M, along, led
+from mapping.led import LED_SD_M, WAY_SD_M, along, led, walked
 from mapping.odometry import REST_SD_M, UNSEEN_M_S, Odometer
-from mapping.prior import Hint, Prior
+from mapping.prior import Cloud, Hint, Prior
 from mapping.register import Match
 from mapping.values import Displacement, Pose
+from mapping.verdict import SEEN, judge, log_odds
+from tests.mapping.rooms import TUNNEL
+from tests.mapping.test_echoes import scan_of
 
 S = 1_000_000_000
 
@@ -113,3 +116,37 @@ def test_a_hint_turned_and_back_is_the_hint() -> None:
     assert (east.dx_m, east.dy_m, east.sd_m) == pytest.approx((2.0, -1.0, 0.3))
     back = east.turned(-math.pi / 2)
     assert (back.dx_m, back.dy_m) == pytest.approx((1.0, 2.0))
+
+
+def cloud_of(sd_m: float) -> Cloud:
+    return Cloud(2.4, 0.2, np.diag([sd_m**2, 0.05**2]))
+
+
+def test_a_scan_is_put_between_its_walls_and_its_way_along_the_way_only() -> None:
+    put = walked(MATCH, cloud_of(0.5), 0.75)
+    assert (put.pose.x_m, put.pose.y_m) == pytest.approx((1.95, 0.3))
+    assert put.covariance[0, 0] == pytest.approx(0.75 * 0.04 + 0.25 * 0.25 + 0.1875 * 0.36)
+    assert (put.covariance[1, 1], put.covariance[2, 2]) == pytest.approx((0.0004, 0.001))
+    assert np.all(put.covariance - np.diag(np.diag(put.covariance)) == 0.0)
+    assert walked(MATCH, cloud_of(0.5), 1.0).pose.x_m == pytest.approx(1.8)
+    assert walked(MATCH, cloud_of(0.5), 0.0).pose.x_m == pytest.approx(2.4)
+
+
+def test_where_walls_do_not_tell_a_scan_is_placed_as_surely_as_its_way_was_seen() -> None:
+    scan, here = scan_of(TUNNEL), Prior(0.0, 0.0, 3.0, 1.0, 0.07)
+    assert log_odds(MATCH) < SEEN
+    assert judge(scan, MATCH, 0, here, chained=True).status != "placed"
+    seen = judge(scan, MATCH, 0, replace(here, cloud=cloud_of(0.5)), chained=True)
+    assert (seen.status, seen.piece) == ("placed", 0)
+    assert seen.covariance[0, 0] > MATCH.covariance[0, 0]
+    assert "90 degrees" in seen.why
+
+
+@pytest.mark.parametrize(
+    ("match", "sd_m"),
+    [(MATCH, 1.1 * WAY_SD_M), (replace(MATCH, astray=3.5), 0.5), (replace(MATCH, overlap=0.1), 0.5)],
+)
+def test_no_scan_is_placed_by_a_way_that_was_not_seen_or_led_elsewhere(match: Match, sd_m: float) -> None:
+    station = judge(scan_of(TUNNEL), match, 0, Prior(0.0, 0.0, 3.0, 1.0, 0.07, cloud=cloud_of(sd_m)), chained=True)
+    assert station.status != "placed"
+    assert station.piece == 1
