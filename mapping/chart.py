@@ -44,6 +44,7 @@ class Charts:
 
     def __init__(self, pieces: Pieces, canvas: Canvas, config: Map) -> None:
         self._pieces, self._canvas, self._config = pieces, canvas, config
+        self._last: tuple[tuple[object, ...], View] | None = None
 
     def match(self, sight: Sight, base: int, prior: Prior, rng: np.random.Generator) -> Match:
         """Register a scan in what stations about its prior, tied to ``base``, saw at its level; or else in others'."""
@@ -53,7 +54,7 @@ class Charts:
             match = register(sight.view, reference, prior, self._config.particles * prior.effort, rng)
             if held == [base] or match.margin < HOPELESS:
                 return match
-            alone = Likelihood(sight.view, self.reference([base], prior, sight), prior)
+            alone = self.alone(sight, base, prior)
             best, _ = search(alone, prior, self._config.particles // 2 * prior.effort, rng, np.zeros((0, 3)))
             margin = doubted(match, best, Likelihood(sight.view, reference, prior), alone)
             return replace(match, margin=min(match.margin, margin))
@@ -64,6 +65,21 @@ class Charts:
             return register(view, reference, prior, particles, rng)
 
         return best_of(best_scaled(sight, reference, rise, self._config, fit))
+
+    def rival(self, sight: Sight, base: int, prior: Prior, match: Match, rng: np.random.Generator) -> float:
+        """Tell the log-posterior of the best pose elsewhere than a match, where the prior is another than its own."""
+        held = self.about(base, (prior.x_m, prior.y_m), sight)
+        if rise_m(sight.scan, self._pieces.sight(held[0]).scan) > LEVEL_M:
+            found = self.match(sight, base, prior, rng)
+            same = apart_m(found.pose, match.pose) <= ELSEWHERE_M
+            return found.height - found.margin if same else found.height
+        like = Likelihood(sight.view, self.reference(held, prior, sight), prior)
+        barred = np.array([[match.pose.x_m, match.pose.y_m, match.pose.heading_rad]])
+        return search(like, prior, self._config.particles // 2 * prior.effort, rng, barred)[1]
+
+    def alone(self, sight: Sight, base: int, prior: Prior) -> Likelihood:
+        """Hold a scan against what one station saw, by itself."""
+        return Likelihood(sight.view, self._pieces.sight(base).view, prior, self._pieces.pose(base))
 
     def about(self, base: int, xy_m: tuple[float, float], sight: Sight) -> list[int]:
         """Stations nearest to a place, of a scan's level if there are any, that lie to ``base`` surely."""
@@ -76,6 +92,13 @@ class Charts:
 
     def reference(self, held: Sequence[int], prior: Prior, sight: Sight) -> View:
         """Make what stations saw, as far as a scan may have seen it, into one view."""
+        at = (prior.x_m, prior.y_m, prior.reach_m, prior.gaussian)
+        key = (sight.scan.index, at, *((k, self._pieces.pose(k)) for k in held))
+        if self._last is None or self._last[0] != key:
+            self._last = key, self._drawn(held, prior, sight)
+        return self._last[1]
+
+    def _drawn(self, held: Sequence[int], prior: Prior, sight: Sight) -> View:
         views = [(self._pieces.pose(k), self._pieces.sight(k).view) for k in held]
         xy = np.concatenate([to_map(pose, view.points.xy_m) for pose, view in views])
         trust = np.concatenate([view.points.trust for _, view in views])

@@ -111,7 +111,7 @@ def lies(
     mean, covariance = local_moments(like, best)
     found = Fit(pose_of(mean), covariance, height, height - other_height, sum(_is_witness(e, best) for e in asked))
     sight = pieces.sight(lead)
-    alone = Likelihood(sight.view, charts.reference([base], prior, sight), prior)
+    alone = charts.alone(sight, base, prior)
     first, _ = search(alone, prior, particles, rng, np.zeros((0, 3)))
     return replace(found, margin=min(found.margin, doubted(found, first, like, alone)))
 

@@ -8,12 +8,14 @@ meets its like, rather than where two long walls meet, which they do in many a w
 
 from __future__ import annotations
 
+import math
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mapping.prior import Prior
+from mapping.values import Pose
 from mapping.view import LEVEL_M, LEVELS, View
 
 SIGMA_M = 0.08
@@ -29,6 +31,8 @@ FAR_WATER, FAR_M = (-0.35, 1.16), 0.45
 """... and what farther out is added: it may be a ghost."""
 FULL = 100.0
 """Points of a full scan; more of them err together and say no more."""
+WIDE_M, FEWER = 0.15, 2
+"""With walls as wide as this, points are neighbours: every second one says as much, in half the time."""
 WITNESSES = 40.0
 """Independent points in a full scan: neighbouring returns share their errors, and walls repeat."""
 POINTS_A_WITNESS = 2.5
@@ -45,10 +49,13 @@ class Posterior(Protocol):
 
 
 class Likelihood:
-    """Log-posterior of poses of a scan in a reference, by walls of a given width."""
+    """Log-posterior of poses of a scan in a reference, by walls of a given width.
 
-    def __init__(self, scan: View, reference: View, prior: Prior) -> None:
-        self._prior = prior
+    The reference may be told in the axes of a station ``at`` a pose of the map; poses and prior are of the map.
+    """
+
+    def __init__(self, scan: View, reference: View, prior: Prior, at: Pose | None = None) -> None:
+        self._prior, self._at = prior, at
         points = max(FULL, float(scan.points.trust.sum()))
         self._forth = _Side(scan, reference, 0.5 / points)
         self._back = _Side(reference, scan, 0.5 / points)
@@ -60,7 +67,8 @@ class Likelihood:
 
     def score(self, poses: Floats, sigma_m: float = SIGMA_M) -> Floats:
         """Log-likelihood a witness ``(n,)`` of poses ``(n, 3)``, against having seen nothing in common."""
-        told = self._forth.sums(*_outward(poses), sigma_m) + self._back.sums(*_inward(poses), sigma_m)
+        seen = poses if self._at is None else _seen_from(self._at, poses)
+        told = self._forth.sums(*_outward(seen), sigma_m) + self._back.sums(*_inward(seen), sigma_m)
         return told.astype(np.float64)
 
 
@@ -68,14 +76,11 @@ class _Side:
     """One side's points, rough ones first, looked up in what the other side saw."""
 
     def __init__(self, points_of: View, seen_by: View, share: float) -> None:
-        points, field = points_of.points, seen_by.field
-        plain = np.isfinite(points.normal_rad)
-        order = np.argsort(plain, kind="stable")
-        self._rough = int((~plain).sum())
-        self._xy1 = np.concatenate([points.xy_m[order].T, np.ones((1, len(order)))]).astype(np.float32)
-        self._weight = (share * points.trust[order]).astype(np.float32)
+        field = seen_by.field
+        self._points, self._share = points_of.points, share
         self._codes, self._shape, self._cell_m = seen_by.codes, field.free.shape, field.cell_m
         self._corner = (field.x0_m, field.y0_m)
+        self._spread = {1: self._every(1)}
         self._tables: dict[float, tuple[Singles, Singles]] = {}
 
     def sums(self, to_x: Floats, to_y: Floats, sigma_m: float) -> Singles:
@@ -84,12 +89,25 @@ class _Side:
             rough, plain = (said(kind, sigma_m).take(self._codes) for kind in (ROUGH, PLAIN))
             self._tables[sigma_m] = (rough, plain)
         rough, plain = self._tables[sigma_m]
+        step = FEWER if sigma_m >= WIDE_M else 1
+        if step not in self._spread:
+            self._spread[step] = self._every(step)
+        xy1, weight, n = self._spread[step]
         rows, cols = self._shape
-        x, y = (self._in_cells(to, axis) @ self._xy1 for axis, to in enumerate((to_x, to_y)))
-        cell = np.clip(y, 0, rows - 1).astype(np.int32) * np.int32(cols) + np.clip(x, 0, cols - 1).astype(np.int32)
-        n = self._rough
-        told = rough.take(cell[:, :n]) @ self._weight[:n] + plain.take(cell[:, n:]) @ self._weight[n:]
+        x, y = (self._in_cells(to, axis) @ xy1 for axis, to in enumerate((to_x, to_y)))
+        cell = np.clip(y, 0, rows - 1, out=y).astype(np.int32)
+        cell *= np.int32(cols)
+        cell += np.clip(x, 0, cols - 1, out=x).astype(np.int32)
+        told = rough.take(cell[:, :n]) @ weight[:n] + plain.take(cell[:, n:]) @ weight[n:]
         return np.asarray(told, dtype=np.float32)
+
+    def _every(self, step: int) -> tuple[Singles, Singles, int]:
+        """Take every so many of the points, each then speaking for as many: places, weights, how many are rough."""
+        plain = np.isfinite(self._points.normal_rad)
+        kinds = [np.flatnonzero(kind)[::step] for kind in (~plain, plain)]
+        order = np.concatenate(kinds)
+        xy1 = np.concatenate([self._points.xy_m[order].T, np.ones((1, len(order)))]).astype(np.float32)
+        return xy1, (step * self._share * self._points.trust[order]).astype(np.float32), len(kinds[0])
 
     def _in_cells(self, rows: Floats, axis: int) -> Singles:
         rows[:, 2] -= self._corner[axis]
@@ -109,6 +127,13 @@ def said(kind: int, sigma_m: float) -> Singles:
             at = (2 * rough + free) * LEVELS
             table[at : at + LEVELS] = ON_WALL[kind][1 - rough] * on + BESIDE[kind] * beside + water
     return table
+
+
+def _seen_from(at: Pose, poses: Floats) -> Floats:
+    """Tell poses ``(n, 3)`` of the map in the axes of one of them."""
+    c, s = math.cos(at.heading_rad), math.sin(at.heading_rad)
+    dx, dy = poses[:, 0] - at.x_m, poses[:, 1] - at.y_m
+    return np.stack([c * dx - s * dy, s * dx + c * dy, poses[:, 2] - at.heading_rad], axis=1)
 
 
 def _outward(poses: Floats) -> tuple[Floats, Floats]:

@@ -140,13 +140,15 @@ class Stations:
         bases = self._bases(i)
         if not self._pieces.all and sight.scan.quality == "moving":
             return nowhere(sight.scan, config, "the vehicle moved during the scan, and no map can begin with it")
-        judged = [self._fit(i, base) for base in bases]
-        for base, station in zip(bases, judged, strict=True):
+        first: Station | None = None
+        for base in bases:
+            station = self._fit(i, base)
             if station.status == "placed":
                 self._pieces.grow(i, sight, base, station.pose, station.covariance)
                 return station
+            first = first or station
         self._tried |= {(base, i): (min(len(self._pieces.of(base)), ASKED), 1) for base in bases}
-        first = judged[0] if judged else origin(sight.scan, config)
+        first = first or origin(sight.scan, config)
         if bases:
             self._guesses[i] = Guess(bases[0], seen_from(self._pieces.pose(bases[0]), first.pose))
         self._pieces.begin(i, sight, first.pose)
@@ -167,9 +169,12 @@ class Stations:
         prior = self._prior(i, base)
         match = along(self._charts.match(sight, base, prior, np.random.default_rng(seeds)), prior)
         if is_turned(match.pose.heading_rad, prior) or (match.fit < BAD_FIT and not prior.is_led):
-            anyhow = replace(prior, cloud=None, disturbed=True)
-            other = self._charts.match(sight, base, anyhow, np.random.default_rng([*seeds, 2]))
-            match, prior = (other, anyhow) if other.height > match.height else (match, prior)
+            anyhow, rng = replace(prior, cloud=None, disturbed=True), np.random.default_rng([*seeds, 2])
+            rival = self._charts.rival(sight, base, anyhow, match, rng)
+            if rival > match.height:
+                match, prior = self._charts.match(sight, base, anyhow, rng), anyhow
+            else:
+                match = replace(match, margin=min(match.margin, match.height - rival))
         piece = 0 if base in self._map else self._sights[base].scan.index + 1
         return judge(sight.scan, match, piece, prior, chained=abs(base - i) == 1)
 

@@ -10,11 +10,12 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from config.schema import Map
+from mapping.graph import put_at
 from mapping.likelihood import PLAIN, ROUGH, Likelihood, said
 from mapping.prior import Prior
 from mapping.register import Match, register
 from mapping.sight import Sight, sight_of
-from mapping.values import Returns, Scan
+from mapping.values import Pose, Returns, Scan
 from mapping.verdict import judge, log_odds
 from mapping.view import LEVEL_M, LEVELS
 from tests.mapping.rooms import KEYHOLE, RECTANGLE, STEP_RAD, TUNNEL, cast
@@ -47,6 +48,21 @@ def test_a_scan_is_found_where_it_was_made(x_m: float, y_m: float, turn_rad: flo
     assert math.hypot(*off) < 0.06
     assert off @ np.linalg.solve(match.covariance[:2, :2], off) < 14.0
     assert not match.ridge
+
+
+def test_a_reference_in_axes_of_its_own_says_the_same_of_poses_of_the_map() -> None:
+    scan, reference = seen(KEYHOLE, 0.5, 0.3, 0.2, seed=2), seen(KEYHOLE, 0.2, -0.5, 0.0)
+    at, prior = Pose(7.0, -3.0, 0.9), Prior(0.0, 0.0, 50.0, 0.0, math.inf)
+    seen_poses = [Pose(0.3, 0.8, 0.2), Pose(-0.4, 1.1, 0.3), Pose(2.0, 0.1, -0.2)]
+    of_map = [put_at(at, pose) for pose in seen_poses]
+    inside, outside = (
+        Likelihood(scan.view, reference.view, prior, where).score(
+            np.array([[pose.x_m, pose.y_m, pose.heading_rad] for pose in poses])
+        )
+        for where, poses in ((None, seen_poses), (at, of_map))
+    )
+    assert outside == pytest.approx(inside, abs=0.01)
+    assert inside[0] > inside[2] + 0.3
 
 
 def test_a_tunnel_is_one_long_mode_that_covers_the_truth() -> None:
