@@ -26,6 +26,8 @@ from mapping.view import Field, Points, View, field_of, points_of, to_map
 
 NEIGHBOURS = 6
 """Stations, those nearest, that make a reference: with all, a scan would take longer as the dive goes on."""
+KEPT = 4 * NEIGHBOURS
+"""Stations of which the cells are kept."""
 POINTS = 250
 """Points of a reference: more would take longer, and tell no more."""
 SURE_M = 0.3
@@ -42,8 +44,9 @@ Floats = NDArray[np.float64]
 class Charts:
     """References of several stations, drawn from what is kept of them."""
 
-    def __init__(self, pieces: Pieces, canvas: Canvas, config: Map) -> None:
-        self._pieces, self._canvas, self._config = pieces, canvas, config
+    def __init__(self, pieces: Pieces, config: Map) -> None:
+        # Not the map's canvas: the map has its own axes, and each would be drawn anew after the other.
+        self._pieces, self._canvas, self._config = pieces, Canvas(config, KEPT), config
         self._last: tuple[tuple[object, ...], View] | None = None
 
     def match(self, sight: Sight, base: int, prior: Prior, rng: np.random.Generator) -> Match:
@@ -55,6 +58,8 @@ class Charts:
             if held == [base] or match.margin < HOPELESS:
                 return match
             alone = self.alone(sight, base, prior)
+            pose = np.array([[match.pose.x_m, match.pose.y_m, match.pose.heading_rad]])
+            match = replace(match, alone=float(alone.score(pose)[0]))
             best, _ = search(alone, prior, self._config.particles // 2 * prior.effort, rng, np.zeros((0, 3)))
             margin = doubted(match, best, Likelihood(sight.view, reference, prior), alone)
             return replace(match, margin=min(match.margin, margin))

@@ -36,10 +36,13 @@ class Cells:
 
 
 class Canvas:
-    """Draws grids, and works out a scan's cells anew only where its pose moved by more than one would see."""
+    """Draws grids, and works out a scan's cells anew only where its pose moved by more than one would see.
 
-    def __init__(self, config: Map) -> None:
-        self._config = config
+    It keeps the cells of all scans, or of the ``most`` that were worked out last.
+    """
+
+    def __init__(self, config: Map, most: int | None = None) -> None:
+        self._config, self._most = config, most
         # The evidence is kept with its cells, so that its id stays its own.
         self._kept: dict[int, tuple[PolarEvidence, Pose, Cells]] = {}
 
@@ -52,7 +55,10 @@ class Canvas:
         known = self._kept.get(id(evidence))
         if known is None or not _same(known[1], pose):
             known = evidence, pose, cells_of(pose, evidence, self._config.cell_m)
+            self._kept.pop(id(evidence), None)
             self._kept[id(evidence)] = known
+            if self._most is not None and len(self._kept) > self._most:
+                del self._kept[next(iter(self._kept))]
         return known[2]
 
 
@@ -78,9 +84,9 @@ def cells_of(pose: Pose, evidence: PolarEvidence, cell_m: float) -> Cells:
     south, west = math.floor((pose.y_m - reach) / cell_m), math.floor((pose.x_m - reach) / cell_m)
     rows = np.arange(south, math.ceil((pose.y_m + reach) / cell_m))
     cols = np.arange(west, math.ceil((pose.x_m + reach) / cell_m))
-    y = ((rows + 0.5) * cell_m - pose.y_m)[:, None]
-    x = ((cols + 0.5) * cell_m - pose.x_m)[None, :]
-    turn = np.arctan2(x, y) - pose.heading_rad
+    y = ((rows + 0.5) * cell_m - pose.y_m).astype(np.float32)[:, None]
+    x = ((cols + 0.5) * cell_m - pose.x_m).astype(np.float32)[None, :]
+    turn = np.arctan2(x, y) - np.float32(pose.heading_rad)
     bearing = np.floor(turn * (table.shape[0] / (2.0 * math.pi)) + 0.5).astype(np.intp) % table.shape[0]
     reached = (np.sqrt(x * x + y * y) / evidence.range_step_m).astype(np.intp)
     told = np.where(reached < table.shape[1], table[bearing, np.minimum(reached, table.shape[1] - 1)], 0.0)

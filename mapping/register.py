@@ -47,6 +47,8 @@ LEVELS = (
 JITTER_M = 0.5
 """Spread of resampled particles, as a share of the step's wall width; their headings likewise, per metre of lever."""
 LEVER_M = 4.0
+FACE_M = 0.25
+"""Water is looked for so far from a wall, on its either side."""
 RIDGE_MARGIN = 4.0
 """A pose elsewhere within this of the best one may lie on the same ridge; of a ridge, the best pose tells little."""
 
@@ -60,7 +62,9 @@ class Match:
     ``overlap`` is the share of the scan's weight that lies on known walls; ``weak_rad`` the direction (clockwise from
     north, in [0, pi)) in which the walls hold it least, and ``hold`` the information there, 0 to 0.5 of the whole.
     ``astray`` tells how many standard deviations the pose is from the prior's cloud, 0 without one.
-    ``height`` is the log-posterior, ``fit`` the same per independent point, ``other`` the best pose elsewhere.
+    ``height`` is the log-posterior, ``fit`` the same per independent point, ``other`` the best pose elsewhere;
+    ``alone`` is the fit to what one station of the reference saw, by itself, and ``behind`` the share of the scan's
+    points that lie on walls which the reference saw from their other side.
 
     ``ridge`` tells that the posterior is one long mode: the pose is its mean, the covariance covers its length, and
     ``margin`` and ``other`` are of poses off the ridge.
@@ -74,6 +78,8 @@ class Match:
     hold: float
     height: float
     fit: float
+    alone: float
+    behind: float
     other: Pose
     astray: float
     ridge: bool
@@ -98,8 +104,8 @@ def register(scan: View, reference: View, prior: Prior, particles: int, rng: np.
     fit = float(like.score(best[None, :])[0])
     margin, astray = height - other_height, prior.astray(mean)
     return Match(
-        pose_of(mean), covariance, margin, on_walls, weak, hold, height, fit, pose_of(other), astray,
-        ridge is not None,
+        pose_of(mean), covariance, margin, on_walls, weak, hold, height, fit, fit, behind(scan, reference, best),
+        pose_of(other), astray, ridge is not None,
     )  # fmt: skip
 
 
@@ -148,6 +154,19 @@ def _near(scan: View, reference: View, pose: Floats) -> Floats:
     xy = to_map(pose_of(pose), scan.points.xy_m)
     distance_m = reference.field.distance_m.ravel().take(reference.field.cells(xy[:, 0], xy[:, 1]))
     return np.asarray(distance_m < 2.0 * SIGMA_M, dtype=np.float64)
+
+
+def behind(scan: View, reference: View, pose: Floats) -> float:
+    """Share of a scan's points that lie on walls of the reference, but with the water on the wrong side of the wall."""
+    plain = np.isfinite(scan.points.normal_rad)
+    xy, normal = scan.points.xy_m[plain], scan.points.normal_rad[plain]
+    ahead = np.stack([np.cos(normal), np.sin(normal)], axis=1)
+    ahead *= np.where((xy * ahead).sum(axis=1) > 0.0, -FACE_M, FACE_M)[:, None]  # to where the scan was made
+    at, field = pose_of(pose), reference.field
+    on, before, after = (field.cells(*to_map(at, xy + off).T) for off in (np.zeros(2), ahead, -ahead))
+    free = field.free.ravel()
+    wrong = (field.distance_m.ravel().take(on) < 2.0 * SIGMA_M) & free.take(after) & ~free.take(before)
+    return float(wrong.sum()) / max(len(plain), 1)
 
 
 def weakest_direction(scan: View, reference: View, pose: Floats) -> tuple[float, float]:

@@ -49,7 +49,7 @@ class Stations:
         self._canvas = Canvas(config)
         self._repeats = Repeats()
         self._pieces = Pieces(math.radians(config.compass_sd_deg), math.radians(config.beam_deg))
-        self._charts = Charts(self._pieces, self._canvas, config)
+        self._charts = Charts(self._pieces, config)
         self._strides = Strides(config)
         self._judged: list[Station] = []
         self._sights: list[Sight] = []

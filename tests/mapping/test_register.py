@@ -13,7 +13,7 @@ from config.schema import Map
 from mapping.graph import put_at
 from mapping.likelihood import PLAIN, ROUGH, Likelihood, said
 from mapping.prior import Prior
-from mapping.register import Match, register
+from mapping.register import Match, behind, register
 from mapping.sight import Sight, sight_of
 from mapping.values import Pose, Returns, Scan
 from mapping.verdict import judge, log_odds
@@ -125,12 +125,21 @@ def test_a_match_is_likelier_right_with_more_margin_and_less_width() -> None:
     assert log_odds(match) > 2.2
     assert log_odds(replace(match, margin=1.0)) < log_odds(match)
     assert log_odds(replace(match, covariance=100.0 * match.covariance)) < log_odds(match)
-    assert log_odds(replace(match, overlap=0.1, fit=0.0)) < log_odds(match)
+    assert log_odds(replace(match, alone=0.1)) < log_odds(match), "the scan before does not bear it out"
+    assert log_odds(replace(match, behind=0.2)) < log_odds(match) - 3.0, "it lies on walls seen from behind"
+
+
+def test_a_wall_seen_from_its_other_side_is_told_from_the_same_wall() -> None:
+    reference = seen(RECTANGLE, 1.0, 0.0, 0.0)
+    inside = seen(RECTANGLE, 1.4, 0.2, 0.0, seed=2)
+    assert behind(inside.view, reference.view, np.array([0.4, 0.2, 0.0])) < 0.02
+    beyond = np.array([7.4, 0.2, 0.0])  # its west wall on the reference's east wall, seen from the outside
+    assert behind(inside.view, reference.view, beyond) > 0.05
 
 
 def test_a_scan_that_fits_best_where_the_one_before_was_made_needs_more() -> None:
     scan = seen(KEYHOLE, 0.3, 0.2, 0.1, seed=2)
-    match = replace(matched(scan, seen(KEYHOLE, 0.0, 0.0, 0.0)), margin=8.0, overlap=0.7, fit=0.6)
+    match = replace(matched(scan, seen(KEYHOLE, 0.0, 0.0, 0.0)), margin=8.0, hold=0.1, alone=0.9)
     here, there = (Prior(x_m, 0.0, 3.0, 0.1, 0.1) for x_m in (0.0, -1.5))
     assert judge(scan.scan, match, 0, here, chained=True).status == "doubtful"
     assert judge(scan.scan, match, 0, there, chained=True).status == "placed"
