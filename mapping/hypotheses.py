@@ -31,7 +31,9 @@ ACCEPT_MARGIN = 12.0
 ACCEPT_SD_M = 0.3
 """... if it is so sure in every direction ..."""
 WITNESSES = 2
-"""... and so many of its scans, each for itself, lie on known walls."""
+"""... and so many of its scans, each for itself, lie on known walls;"""
+LONE_MARGIN = 18.0
+"""where only one does, the margin must be as large as this.  Where none does, nine joins in twenty are wrong."""
 ACCEPT_OVERLAP, ACCEPT_FIT = 0.35, 0.35
 
 OVERLAP_POWER, FEW = 0.8, 0.1
@@ -57,7 +59,8 @@ class Fit:
     @property
     def is_sure(self) -> bool:
         """Tell whether the pieces may be joined."""
-        return self.margin >= ACCEPT_MARGIN and self.witnesses >= WITNESSES and sd_m(self.covariance) <= ACCEPT_SD_M
+        needed = ACCEPT_MARGIN if self.witnesses >= WITNESSES else LONE_MARGIN
+        return self.margin >= needed and self.witnesses > 0 and sd_m(self.covariance) <= ACCEPT_SD_M
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,6 +9,7 @@ import pytest
 from config.schema import Map
 from mapping.echoes import pick
 from mapping.graph import seen_from
+from mapping.hypotheses import Fit
 from mapping.pieces import Pieces, limited
 from mapping.refine import bond, wall_of
 from mapping.sight import Sight, sight_of
@@ -133,6 +134,16 @@ def test_what_only_a_dropped_station_held_falls_apart(keyhole: list[Sight]) -> N
     pieces.grow(2, keyhole[2], 1, Pose(40.0, 0.0, 2.0), DOUBT)
     pieces.drop(1)
     assert pieces.all == [(0,), (2,)]
+
+
+def test_pieces_are_joined_by_two_witnesses_or_by_one_that_is_very_sure() -> None:
+    fit = Fit(Pose(1.0, 2.0, 0.0), DOUBT, height=60.0, margin=13.0, witnesses=2)
+    assert fit.is_sure
+    assert not replace(fit, witnesses=1).is_sure
+    assert replace(fit, witnesses=1, margin=19.0).is_sure
+    assert not replace(fit, witnesses=0, margin=40.0).is_sure, "none of its scans lies on known walls"
+    assert not replace(fit, margin=11.0).is_sure
+    assert not replace(fit, covariance=100.0 * DOUBT).is_sure
 
 
 def test_the_largest_piece_is_the_map_and_begins_at_its_first_station(keyhole: list[Sight]) -> None:
