@@ -7,7 +7,7 @@ import pytest
 
 from mapping.values import Pose, Scan, Station
 from tools.bench.align import angle_between
-from tools.bench.truth import Errors, errors_of
+from tools.bench.truth import Errors, closure_m, errors_of
 from tools.emulator.dive import Dive
 from tools.emulator.site import SITES
 from tools.emulator.vehicle import Rest
@@ -59,3 +59,13 @@ def test_errors_across_the_tunnel_are_told_as_such() -> None:
     beside = np.zeros((9, 2))
     beside[4, 1] = 0.2
     assert found(beside, (0.1, 0.1)).across_m.max() == pytest.approx(0.2 * 8 / 9, abs=0.01)
+
+
+def test_errors_along_the_tunnel_are_told_about_the_origin_and_the_gap_from_the_first_rest_to_the_last() -> None:
+    slid = np.zeros((9, 2))
+    slid[:, 0] = 0.1 * np.arange(9)
+    errors = found(slid, (0.5, 0.05))
+    assert errors.along_m[0] == 0.0
+    assert errors.along_m.max() == pytest.approx(0.8, abs=0.02)
+    assert closure_m(errors, list(range(9)), 9) == pytest.approx(0.8, abs=0.02)
+    assert np.isnan(closure_m(errors, list(range(9)), 12))

@@ -43,8 +43,9 @@ class TruthFigures:
 
     ``stray`` counts placed stations that were made while the vehicle was under way.  ``covered`` is the share of placed
     stations within their stated 95 % ellipse about the origin's true place; ``across_max_m`` the greatest error across
-    a passage, nan at sites that are none; ``sd_max_m`` the widest ellipse that was stated.  Walls are judged level by
-    level and counted together (``tools.bench.leaning``).
+    a passage and ``along_max_m`` along it, the latter about the origin's true place as the ellipses are, nan at sites
+    that are none; ``closure_m`` is the error from the first rest to the last, nan where one is not placed; ``sd_max_m``
+    the widest ellipse that was stated.  Walls are judged level by level and counted together (``tools.bench.leaning``).
     """
 
     site: str
@@ -62,6 +63,8 @@ class TruthFigures:
     error_95_m: float
     error_max_m: float
     across_max_m: float
+    along_max_m: float
+    closure_m: float
     sd_max_m: float
     heading_max_deg: float
     wall_precision: float
@@ -90,9 +93,19 @@ class Errors:
         return float(inside.mean()) if len(inside) else 1.0
 
     @property
+    def off_m(self) -> Floats:
+        """Distances ``(n,)`` from where the stations were."""
+        return np.asarray(np.linalg.norm(self.fitted_m, axis=1))
+
+    @property
     def across_m(self) -> Floats:
         """Errors across the course ``(n,)``."""
         return np.asarray(np.abs(self.fitted_m[:, 0] * self.course[:, 1] - self.fitted_m[:, 1] * self.course[:, 0]))
+
+    @property
+    def along_m(self) -> Floats:
+        """Errors along the course ``(n,)``, the origin at its true place."""
+        return np.asarray(np.abs((self.anchored_m * self.course).sum(axis=1)))
 
     @property
     def sd_m(self) -> Floats:
@@ -123,7 +136,6 @@ def judge(dive: Dive, state: MapState, config: Config, pilot: str = "steady") ->
     placed = [station for station in state.stations if station.status == "placed"]
     pairs = [(station, rest) for station in placed if (rest := _rest_of(station, rests)) is not None]
     errors, alignment = errors_of(dive, pairs)
-    errors_m = np.linalg.norm(errors.fitted_m, axis=1)
     walls = _walls(dive, state, pairs, (alignment, config.sonar.range_m))
     return TruthFigures(
         site=dive.site.name,
@@ -135,17 +147,30 @@ def judge(dive: Dive, state: MapState, config: Config, pilot: str = "steady") ->
         stray=len(placed) - len(pairs),
         pieces=len({station.piece for station in state.stations}),
         levels=1 + len(state.levels),
-        wrong=int((errors_m > WRONG_M).sum()),
+        wrong=int((errors.off_m > WRONG_M).sum()),
         covered=round(errors.covered, 3),
-        error_median_m=round(float(np.median(errors_m)), 4),
-        error_95_m=round(float(np.percentile(errors_m, 95)), 4),
-        error_max_m=round(float(np.max(errors_m)), 4),
-        across_max_m=round(float(errors.across_m.max()), 4) if dive.site.name in PASSAGES else nan,
+        error_median_m=round(float(np.median(errors.off_m)), 4),
+        error_95_m=round(float(np.percentile(errors.off_m, 95)), 4),
+        error_max_m=round(float(np.max(errors.off_m)), 4),
+        across_max_m=_in_passage(dive, errors.across_m),
+        along_max_m=_in_passage(dive, errors.along_m),
+        closure_m=round(closure_m(errors, [rest.index for _, rest in pairs], len(rests)), 4),
         sd_max_m=round(float(errors.sd_m.max()), 3),
         heading_max_deg=round(float(np.degrees(errors.heading_rad.max())), 3),
         wall_precision=round(walls.precision, 4),
         wall_recall=round(walls.recall, 4),
     )
+
+
+def _in_passage(dive: Dive, errors_m: Floats) -> float:
+    return round(float(errors_m.max()), 4) if dive.site.name in PASSAGES else nan
+
+
+def closure_m(errors: Errors, rests: list[int], count: int) -> float:
+    """Error from the first of ``count`` rests to the last one; nan where one of them was not placed."""
+    if 0 not in rests or count - 1 not in rests:
+        return nan
+    return float(np.linalg.norm(errors.fitted_m[rests.index(count - 1)] - errors.fitted_m[rests.index(0)]))
 
 
 def errors_of(dive: Dive, pairs: list[tuple[Station, Rest]]) -> tuple[Errors, Alignment]:
