@@ -25,6 +25,8 @@ HINT_LOG_ODDS = 0.5
 """Occupied by no more than this is a hint: hints of several scans are not added up, for they err alike."""
 VAGUE_LOG_ODDS = 0.45
 """A vague return's hint, within its standard deviation."""
+FORWARD_M = 0.005
+"""Walls are drawn so much before their faces: nothing is told free behind them, which moves what is drawn back."""
 BACK_M = 0.05
 """Behind its face a wall goes on at least so far, hardly seen: a hint."""
 PLACE_SD_M = 0.005
@@ -138,7 +140,8 @@ def polar_evidence(scan: Scan, returns: Returns, beam_rad: float, cell_m: float)
     at = first[:, None] + np.arange(int((last - first).max(initial=0)))
     row, column = np.nonzero(at < last[:, None])
     fine, at = faces[row], at[row, column]
-    log_odds[fine, at] = of_face((ranges[at] - fan.range_m[fine]) * square[fine], sd[fine] * square[fine], cell_m)
+    behind_m = (ranges[at] - fan.range_m[fine]) * square[fine] + FORWARD_M
+    log_odds[fine, at] = of_face(behind_m, sd[fine] * square[fine], cell_m)
     return PolarEvidence(log_odds, step_m)
 
 

@@ -42,7 +42,10 @@ SPEEDS_M_S: Final = (1350.0, 1650.0)
 
 @dataclass(frozen=True, slots=True)
 class Calibration:
-    """What to configure, with standard deviations, and how long the room's sides read before."""
+    """What to configure, with standard deviations, and how long the room's sides read before.
+
+    ``off_m`` is by how much each side is off afterwards, in the circle in which it is off most.
+    """
 
     circles: int
     sound_speed_m_s: float
@@ -50,6 +53,7 @@ class Calibration:
     range_offset_m: float
     range_offset_sd_m: float
     read_m: tuple[float, float]
+    off_m: tuple[float, float]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -132,6 +136,7 @@ def calibrate(sides_m: NDArray[np.float64], room_m: tuple[float, float], sound_s
             f"{truth_m[0]:g} x {truth_m[1]:g} m; measure it again"
         )
     sd_scale, sd_offset_m = np.sqrt(np.diag(covariance))
+    off_m = np.abs(scale * sides_m + 2.0 * offset_m - truth_m).max(axis=0)
     return Calibration(
         count,
         round(speed_m_s, 1),
@@ -139,6 +144,7 @@ def calibrate(sides_m: NDArray[np.float64], room_m: tuple[float, float], sound_s
         round(float(offset_m), 4),
         round(float(sd_offset_m), 4),
         (round(float(read_m[0]), 3), round(float(read_m[1]), 3)),
+        (round(float(off_m[0]), 3), round(float(off_m[1]), 3)),
     )
 
 
@@ -148,6 +154,7 @@ def text(found: Calibration, room_m: tuple[float, float]) -> str:
     return "\n".join(
         [
             f"# {found.circles} circles: {truth} read {found.read_m[0]:.2f} x {found.read_m[1]:.2f} m",
+            f"# then no circle is off by more than {100 * found.off_m[0]:.1f} x {100 * found.off_m[1]:.1f} cm",
             "[sonar]",
             f"sound_speed_m_s = {found.sound_speed_m_s}  # sd {found.sound_speed_sd_m_s}",
             "[map]",

@@ -54,6 +54,12 @@ def test_figures_come_with_how_sure_they_are(pool_log: Path, capsys: pytest.Capt
     assert told["circles"] == 2
     assert 0.5 < told["sound_speed_sd_m_s"] < 15.0
     assert abs(told["sound_speed_m_s"] - TRUE_SPEED_M_S) < 3.0 * told["sound_speed_sd_m_s"]
+    assert max(told["off_m"]) < 0.03
+
+
+def test_the_circle_that_is_off_most_is_told() -> None:
+    read = np.array([[8.0, 5.0], [8.0, 5.0], [8.0, 5.0], [8.0, 5.05], [7.97, 5.0]])
+    assert calibrate(read, (8.0, 5.0), 1481.0).off_m == pytest.approx((0.03, 0.05), abs=0.002)
 
 
 def test_scale_and_offset_are_told_apart_by_a_long_room_and_not_by_a_square_one() -> None:
@@ -74,6 +80,8 @@ def test_a_room_of_another_size_is_refused(pool_log: Path, capsys: pytest.Captur
 
 
 def test_the_lines_are_toml() -> None:
-    lines = text(Calibration(3, 1450.2, 4.0, -0.0121, 0.005, (8.11, 5.07)), (5.0, 8.0))
+    lines = text(Calibration(3, 1450.2, 4.0, -0.0121, 0.005, (8.11, 5.07), (0.012, 0.021)), (5.0, 8.0))
     assert tomllib.loads(lines) == {"sonar": {"sound_speed_m_s": 1450.2}, "map": {"range_offset_m": -0.0121}}
-    assert lines.startswith("# 3 circles: 8 x 5 m read 8.11 x 5.07 m")
+    assert lines.startswith(
+        "# 3 circles: 8 x 5 m read 8.11 x 5.07 m\n# then no circle is off by more than 1.2 x 2.1 cm\n"
+    )
