@@ -16,7 +16,7 @@ from skimage.graph import MCP_Geometric
 
 from fill.curves import Curve, sampled
 from fill.scene import Scene
-from fill.segments import End
+from fill.segments import End, cell_at
 
 _SHORTEST: Final = 3.0  # cells: over less there is nothing to be led by
 _ASIDE: Final = 0.35  # of the gap: so far off the chord a way is looked for
@@ -60,8 +60,7 @@ def window(a: End, b: End, gap: float, shape: tuple[int, ...]) -> tuple[NDArray[
 def _way(cost: Layer, a: End, b: End, low: NDArray[np.int64]) -> Layer | None:
     """Points ``(n, 2)`` of x and y on the cheapest way from end to end; costs below 0 forbid a cell."""
     first, last = (
-        tuple(np.clip(np.rint([end.y, end.x]).astype(np.int64) - low, 0, np.array(cost.shape) - 1).tolist())
-        for end in (a, b)
+        tuple(np.clip(cell_at(np.array([end.y, end.x])) - low, 0, np.array(cost.shape) - 1).tolist()) for end in (a, b)
     )
     if cost[first] < 0.0 or cost[last] < 0.0:
         return None

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from fill.segments import End
+from fill.segments import End, cell_at
 
 _STEP: Final = 0.25  # cells between two points of a curve
 _NOISE: Final = 0.4  # standard deviation of a centre line about its wall, cells
@@ -92,7 +92,7 @@ def bowed(curve: Curve, heights: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def cells_of(points: NDArray[np.float64]) -> NDArray[np.int32]:
     """Cells ``(n, 2)`` of row and column that a curve passes, each once in a row."""
-    cells: NDArray[np.int32] = np.rint(points[:, ::-1]).astype(np.int32)
+    cells: NDArray[np.int32] = cell_at(points[:, ::-1]).astype(np.int32)
     fresh = np.concatenate([[True], np.any(cells[1:] != cells[:-1], axis=1)])
     return np.asarray(cells[fresh], np.int32)
 

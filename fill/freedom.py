@@ -13,13 +13,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from fill.segments import End
+from fill.segments import End, cell_at
 from mapping.values import FREE, UNKNOWN
 
 
 def at(state: NDArray[np.uint8], x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.uint8]:
     """State of the cells at places in cells, UNKNOWN outside the grid."""
-    row, col = np.rint(y).astype(np.int64), np.rint(x).astype(np.int64)
+    row, col = cell_at(y), cell_at(x)
     inside = (row >= 0) & (row < state.shape[0]) & (col >= 0) & (col < state.shape[1])
     found = np.full(row.shape, UNKNOWN, np.uint8)
     found[inside] = state[row[inside], col[inside]]

@@ -28,6 +28,7 @@ _BENDABLE: Final = 16  # cells of centre line from which a bend can be told
 _CLEARLY: Final = 0.5
 _EVEN: Final = 0.5  # cells off the parabola: more is a corner
 _SPUR_ROUNDS: Final = 2
+_TO_NEXT: Final = 0.5 + 1e-6  # of a cell
 _DOT: Final = 3  # cells: less has no length
 _MOST_TIPS_OF_ONE: Final = 1000
 _MOST_TIPS: Final = 6000  # of the largest walls: in the largest real maps there are 2,200
@@ -187,6 +188,14 @@ def _end(
     first = places[0] + corner[::-1]
     x, y = (foot + out * reach + first).tolist()
     return End(x, y, float(out[0]), float(out[1]), thick, line + first, length, wander, int(label.flat[at]))
+
+
+def cell_at(place: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Row or column of the cell at a place; a place on the border of two is in the later one, wherever a grid begins.
+
+    (Rounding to even gives it now to one, now to the other, and so does what is left of rounding errors.)
+    """
+    return np.asarray(np.floor(place + _TO_NEXT), np.int64)
 
 
 def smooth(line: NDArray[np.int64]) -> NDArray[np.float64]:

@@ -23,6 +23,8 @@ _SHAPES: Final = {
     "tangent": "the wall turns",
     "corner": "two walls meet in a corner",
     "side": "the wall goes on to the side of another",
+    "shore": "the wall follows the edge of the water",
+    "channel": "the wall runs between two waters",
 }
 
 

@@ -17,7 +17,7 @@ from fill.channels import channels
 from fill.curves import Chord, Curve, bowed, cells_of, chord, corner, polynomial, straight, tangent
 from fill.freedom import at, clear_path
 from fill.scene import Scene
-from fill.segments import End
+from fill.segments import End, cell_at
 from mapping.values import FREE
 
 _BOWS: Final = np.array([0.0, 1.0, -1.0, 2.0, -2.0, 3.0, -3.0])  # cells
@@ -92,7 +92,7 @@ def onto_sides(a: End, scene: Scene, longest: float) -> Drawn:
     found = []
     places, looked = _meets(a, scene, longest)
     for rank, (x, y) in enumerate(places):
-        row, col = round(y), round(x)
+        row, col = cell_at(np.array([y, x])).tolist()
         gap = math.hypot(x - a.x, y - a.y)
         into = (a.x - x) / gap, (a.y - y) / gap
         half = min(float(scene.walls.half[row, col]) - 0.5, a.half)
@@ -155,7 +155,7 @@ def _meets(a: End, scene: Scene, longest: float) -> tuple[list[tuple[float, floa
     turn = math.atan2(a.dy, a.dx) + _GLANCES[:, None]
     x, y = a.x + along * np.cos(turn), a.y + along * np.sin(turn)
     rows, cols = scene.state.shape
-    row, col = np.rint(y).astype(np.int64), np.rint(x).astype(np.int64)
+    row, col = cell_at(y), cell_at(x)
     inside = (row >= 0) & (row < rows) & (col >= 0) & (col < cols)
     row, col = np.clip(row, 0, rows - 1), np.clip(col, 0, cols - 1)
     label = scene.walls.label[row, col]

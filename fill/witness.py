@@ -18,7 +18,7 @@ from fill.candidates import FEATURES
 from fill.closing import Closed
 from fill.curves import chord, curves, straight
 from fill.freedom import at
-from fill.segments import End
+from fill.segments import End, cell_at
 from mapping.values import FREE, OCCUPIED, UNKNOWN
 
 HOLE_FEATURES: Final = (
@@ -157,7 +157,7 @@ def _both_sides(closed: Closed, water: NDArray[np.bool_], low: NDArray[np.int64]
     off = np.arange(1.0, 6.0)
     found = []
     for sign in (1.0, -1.0):
-        looks = np.rint(closed.cells[:, None] + sign * off[:, None] * aside - low).astype(np.int64)
+        looks = cell_at(closed.cells[:, None] + sign * off[:, None] * aside - low)
         inside = np.all((looks >= 0) & (looks < water.shape), axis=2)
         looks = np.where(inside[..., None], looks, 0)
         found.append(np.any(water[looks[..., 0], looks[..., 1]] & inside, axis=1))

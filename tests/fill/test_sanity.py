@@ -49,6 +49,18 @@ def test_of_noise_only_the_longest_walls_keep_their_ends() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("share", [0.05, 0.5])
+def test_large_noise_is_filled_hardly_at_all(share: float) -> None:
+    random = np.random.default_rng(0)
+    state = np.where(random.random(_LARGE) < 0.3, FREE, UNKNOWN).astype(np.uint8)
+    state[random.random(_LARGE) < share] = OCCUPIED
+    filled = fill(state)
+    assert np.all(state[filled.hole >= 0] == UNKNOWN)
+    assert np.count_nonzero(filled.hole >= 0) < 1e-4 * state.size
+    assert np.all(np.isfinite(filled.certainty))
+
+
+@pytest.mark.slow
 def test_noise_is_never_filled_over_what_was_seen() -> None:
     state = noise(120)
     filled = fill(state)
