@@ -86,8 +86,9 @@ def window(place: Place, state: NDArray[np.uint8]) -> NDArray[np.uint8]:
 def knock_out(state: NDArray[np.uint8], place: Place) -> Exam | None:
     """Take a piece out of the wall in a window ``state``, or the water out of an opening; None where neither is."""
     random = np.random.default_rng(place.number)
-    walls = find_walls(state == OCCUPIED)
-    if place.number // len(SIZES) % _OPENINGS == 0 and (gates := _openings(walls, state)):
+    opening = place.number // len(SIZES) % _OPENINGS == 0
+    walls = find_walls(state == OCCUPIED, ended=opening)
+    if opening and (gates := _openings(walls, state)):
         return _blank_opening(*gates[int(random.integers(len(gates)))], state, random)
     path = _piece(place.middle, walls.centre, place.size)
     return None if path is None else _erase(path, walls, state, random)

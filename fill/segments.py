@@ -71,10 +71,11 @@ class Walls:
     ends: tuple[End, ...]
 
 
-def find_walls(mask: NDArray[np.bool_], corner: tuple[int, int] = (0, 0)) -> Walls:
+def find_walls(mask: NDArray[np.bool_], corner: tuple[int, int] = (0, 0), ended: bool = True) -> Walls:
     """Find the walls in ``mask`` ``(rows, cols)`` and their true ends, in order of row and column.
 
     ``corner`` is the mask's first cell: an end is the same to the byte from whichever part of a grid it was found in.
+    Ends are looked for where ``ended``; without, centre lines are found in less time.
     """
     half = _depths(mask)
     wall = half > 0
@@ -84,7 +85,7 @@ def find_walls(mask: NDArray[np.bool_], corner: tuple[int, int] = (0, 0)) -> Wal
     promising = _promising(lines.tips(wall), label)[label]
     lines.prune(half, promising)
     inner = slice(1, -1), slice(1, -1)
-    found = (_end(at, lines, half, label, corner) for at in lines.tips(promising))
+    found = (_end(at, lines, half, label, corner) for at in (lines.tips(promising) if ended else ()))
     kept = tuple(end for end in found if end is not None)
     return Walls(wall[inner], label[inner], half[inner], lines.mask()[inner], kept)
 
