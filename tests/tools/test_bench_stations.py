@@ -1,11 +1,13 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from config.errors import DataError, UsageError
+from tools.bench.long_dive import long_dive
 from tools.bench.stations import measure, pairs, read
 from tools.bench.whole_logs import whole
 
@@ -24,6 +26,14 @@ def test_a_log_that_is_not_there_is_told(tmp_path: Path) -> None:
     np.savez(tmp_path / "other.npz", a=np.zeros(3))
     with pytest.raises(DataError, match="no log of stations"):
         read(tmp_path / "other.npz")
+
+
+def test_a_long_dive_goes_up_and_down_a_log(shared_data: Path) -> None:
+    log = read(shared_data / "stations" / "intel.npz")
+    short = replace(log, sights=log.sights[:4])
+    figures = long_dive(short, "intel", late=22)
+    assert (figures.early, figures.late) == (20, 22)
+    assert min(figures.early_ms, figures.late_ms) > 0.0
 
 
 @pytest.mark.slow

@@ -24,6 +24,7 @@ from mapping.sight import Sight, sight_of
 from mapping.values import Returns, Scan
 from mapping.verdict import judge
 from tools.bench.align import angle_between
+from tools.bench.long_dive import LongFigures, long_dive
 from tools.bench.whole_logs import LogFigures, whole
 
 REACH_M: Final = 3.0
@@ -130,7 +131,7 @@ def _covered(covariance: Floats, off_m: Floats) -> bool:
     return bool(off_m @ np.linalg.solve(covariance[:2, :2], off_m) <= IN_95)
 
 
-def measure(data: Path) -> Iterator[PairFigures | LogFigures]:
+def measure(data: Path) -> Iterator[PairFigures | LogFigures | LongFigures]:
     """Yield the figures of all logs in a folder of recordings; raises UsageError where there is none."""
     logs = {path.stem: read(path) for path in sorted((data / "stations").glob("*.npz"))}
     if not logs:
@@ -140,3 +141,5 @@ def measure(data: Path) -> Iterator[PairFigures | LogFigures]:
     for name, log in logs.items():
         for hinted in (False, True):
             yield whole(log, name, hinted=hinted)
+    steady = min(logs, key=lambda name: int(logs[name].chain[-1]))
+    yield long_dive(logs[steady], steady)
