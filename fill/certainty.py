@@ -1,10 +1,10 @@
-"""How sure a fill is: logistic models learnt on other places, set right by the site's own walls.
+"""How sure a fill is: models learnt on other places, set right by the site's own walls.
 
 The paper tabulates hits by distance and runs a cubic through them (section 3.1.2), which leaves 0 to 1 beyond its last
-bin.  Here a cell's certainty hangs on what speaks for it and for its hole (``witness``), with weights learnt on other
+bin.  Here a cell's certainty hangs on what speaks for it and for its hole (``witness``), as learnt on other
 places (``prior``).  What the site's own knocked-out holes teach moves a level and a slope on top of that, no further
-than sites were found to differ.  Nothing is told beyond what was learnt: features are held at the edges of their
-learnt range, and a gap longer than any learnt is told less sure the longer it is, and marked.
+than sites were found to differ.  Nothing is told beyond what was learnt: trees know no trend beyond their last cut,
+and a gap longer than any learnt is told less sure the longer it is, and marked.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fill.logistic import Logistic, sigmoid
+from fill.trees import Trees
 from fill.witness import CELL_FEATURES, HOLE_FEATURES
 
 LOWEST: Final = 0.02
@@ -25,34 +26,25 @@ HIGHEST: Final = 0.995
 """Nothing guessed is told as sure."""
 _WIDER: Final = 16.0  # variance that a gap e times as long as any learnt adds to the log-odds
 _LOG_GAP: Final = HOLE_FEATURES.index("log gap")
-_LOG_ODDS: Final = HOLE_FEATURES.index("log-odds")
-_LOG_AWAY: Final = CELL_FEATURES.index("log away")
 
-DESIGN: Final = (
-    *HOLE_FEATURES,
-    *CELL_FEATURES,
-    *(f"{name} x log-odds" for name in CELL_FEATURES),
-    *(f"{name} x log away" for name in CELL_FEATURES),
-)
+DESIGN: Final = (*HOLE_FEATURES, *CELL_FEATURES)
 """What the model of cells weighs, in this order."""
 
 
 @dataclass(frozen=True, slots=True)
 class Learnt:
-    """Weights ``(k,)`` of ``DESIGN``, and the range ``low`` to ``high`` ``(k,)`` in which each was learnt."""
+    """What is learnt of cells: ``trees`` over ``DESIGN``, and the logarithm of the ``longest`` gap learnt on."""
 
-    weights: NDArray[np.float64]
-    low: NDArray[np.float64]
-    high: NDArray[np.float64]
+    trees: Trees
+    longest: float
 
     def log_odds(self, hole: NDArray[np.float64], cells: NDArray[np.float64]) -> NDArray[np.float64]:
         """Log-odds ``(n,)`` that the cells of a fill are right."""
-        design = np.clip(design_of(hole, cells), self.low, self.high)
-        return np.asarray(np.sum(design * self.weights, axis=1) * self.damped(hole), np.float64)
+        return self.trees.log_odds(design_of(hole, cells)) * self.damped(hole)
 
     def excess(self, hole: NDArray[np.float64]) -> float:
         """Logarithm of how many times longer than any learnt the gap is; 0 within what was learnt."""
-        return max(0.0, float(hole[_LOG_GAP] - self.high[_LOG_GAP]))
+        return max(0.0, float(hole[_LOG_GAP] - self.longest))
 
     def damped(self, hole: NDArray[np.float64]) -> float:
         """Return the share of the log-odds that is left where the gap is longer than any learnt."""
@@ -67,7 +59,7 @@ class Belief:
     log-odds of cells by a level and a slope; ``whole`` tells from the cells whether a fill is right as a whole.
     """
 
-    hole: Logistic
+    hole: Trees
     cell: Learnt
     site: Logistic
     whole: NDArray[np.float64]
@@ -92,10 +84,7 @@ class Belief:
 
 def design_of(hole: NDArray[np.float64], cells: NDArray[np.float64]) -> NDArray[np.float64]:
     """Features ``(n, k)`` after ``DESIGN`` of the cells of one fill."""
-    return np.concatenate(
-        [np.repeat(hole[None], len(cells), axis=0), cells, cells * hole[_LOG_ODDS], cells * cells[:, _LOG_AWAY, None]],
-        axis=1,
-    )
+    return np.concatenate([np.repeat(hole[None], len(cells), axis=0), cells], axis=1)
 
 
 def falling(chance: NDArray[np.float64], away: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -13,13 +13,13 @@ from scipy import ndimage
 
 from fill.candidates import Candidate
 from fill.freedom import capped
-from fill.logistic import Logistic
 from fill.matching import asked, assign, candidates, gain
 from fill.memory import Memory
 from fill.segments import EIGHT, End, Walls
+from fill.trees import Trees
 from mapping.values import OCCUPIED, UNKNOWN
 
-THRESHOLD: Final = 0.25
+THRESHOLD: Final = 0.3
 """A fill less likely right than this is not drawn: the end stays open."""
 _MOST_ENDS: Final = 1500
 _SMALL: Final = 12.0  # cells: gaps that are closed before any larger one is looked at
@@ -42,7 +42,7 @@ class Closed:
 
 
 def close_holes(
-    state: NDArray[np.uint8], longest: float, model: Logistic, threshold: float = THRESHOLD,
+    state: NDArray[np.uint8], longest: float, model: Trees, threshold: float = THRESHOLD,
     memory: Memory | None = None,
 ) -> list[Closed]:  # fmt: skip
     """Close the holes of ``state`` ``(rows, cols)`` up to ``longest`` cells; ``memory`` spares work done before."""
@@ -82,7 +82,7 @@ def _longest(ends: tuple[End, ...]) -> tuple[End, ...]:
 
 
 def _close_round(
-    found: list[Candidate], model: Logistic, threshold: float, state: NDArray[np.uint8], wall: NDArray[np.bool_],
+    found: list[Candidate], model: Trees, threshold: float, state: NDArray[np.uint8], wall: NDArray[np.bool_],
     memory: Memory,
 ) -> list[Closed]:  # fmt: skip
     """Take the best candidates, and mark their cells in ``wall``."""

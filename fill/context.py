@@ -25,6 +25,7 @@ FEATURES: Final = (
     "kink", "lesser kink", "kink x log gap", "lesser kink x log gap", "corner x turn",
     "bent", "bent x turn",
     "log support", "log longer support", "wander", "detour", "bow", "tangent", "corner", "channel", "shore", "side",
+    "step", "same wall", "hugs", "squeezed", "hugs x log gap", "squeezed x log gap",
     "near both", "near one", "water both", "snug both", "snug any", "near water", "far water", "near ragged",
     "far ragged", "near bulge", "far bulge", "near reach", "far reach", "wall beyond", "wall close",
     "divides", "water both, divides", "near both, divides",
@@ -34,6 +35,7 @@ FEATURES: Final = (
 )  # fmt: skip
 """What a candidate is judged by, in this order."""
 
+_KINDS: Final = ("tangent", "corner", "channel", "shore", "side", "step")
 _MIDDLE: Final = slice(1, PLACES - 1)
 _SEEN: Final = slice(1, 7)  # cells off the face that are near
 _REACH: Final = 0.6  # of the gap: so far to its sides water is looked for
@@ -41,6 +43,8 @@ _CLOSE: Final = 5
 _PASSABLE: Final = 4.0  # cells; narrower gaps are no passage
 _WET: Final = 0.35
 _BOWS: Final = 6
+_HUGS: Final = 0.8  # cells off the place that a wall has whose water was seen
+_SQUEEZED: Final = 0.4  # cells of water beyond its own thickness that a way has no room for
 _LEAVING: Final = 16  # steps of a quarter cell over which a way leaves its wall
 _BEYOND_SIGHT: Final = 28.0  # cells: length of a wall that is followed no further
 _MOST: Final = 256  # ways judged at a time
@@ -84,7 +88,7 @@ def _features(ways: Sequence[Way], scene: Scene, closer: Layer) -> Layer:
     columns = _columns(ways)
     beside = look_beside(ways, columns.points, columns.first, columns.last, scene.state)
     found = _shape(ways, columns) | _banks(columns.gap, beside)
-    found |= _jambs(ways, columns.side, beside, scene.state) | _under(ways, scene)
+    found |= _jambs(ways, columns.side, beside, scene.state) | _under(ways, columns, scene)
     found["one"] = np.ones(len(ways))
     found["closer partners"] = closer
     found["water both, divides"] = found["water both"] * found["divides"]
@@ -93,6 +97,8 @@ def _features(ways: Sequence[Way], scene: Scene, closer: Layer) -> Layer:
     found["lesser kink x log gap"] = found["lesser kink"] * found["log gap"]
     found["bent x turn"] = found["bent"] * found["turn"]
     found["corner x turn"] = found["corner"] * found["turn"]
+    found["hugs x log gap"] = found["hugs"] * found["log gap"]
+    found["squeezed x log gap"] = found["squeezed"] * found["log gap"]
     found["turn x log gap"] = found["turn"] * found["log gap"]
     passage = ((found["water both"] > _WET) & (columns.gap > _PASSABLE)).astype(np.float64)
     found["passage"] = passage
@@ -142,7 +148,8 @@ def _shape(ways: Sequence[Way], of: _Ways) -> Told:
         "detour": np.log(np.maximum(length, 1.0) / gap),
         "bent": ((kinds == "quadratic") | (kinds == "cubic")).astype(np.float64),
         "bow": np.minimum(of.bow, _BOWS) / 2.0,
-    } | {name: (kinds == name).astype(np.float64) for name in ("tangent", "corner", "channel", "shore", "side")}
+        "same wall": np.array([way.ends[0].wall == way.ends[1].wall for way in ways], np.float64),
+    } | {name: (kinds == name).astype(np.float64) for name in _KINDS}
 
 
 def _kinks(ways: Sequence[Way], of: _Ways) -> tuple[Layer, Layer]:
@@ -223,15 +230,18 @@ def _jambs(ways: Sequence[Way], side: NDArray[np.bool_], beside: Beside, state: 
     }
 
 
-def _under(ways: Sequence[Way], scene: Scene) -> Told:
+def _under(ways: Sequence[Way], of: _Ways, scene: Scene) -> Told:
     """Tell what the ways themselves pass."""
     rows, cols = np.concatenate([way.path for way in ways]).T
     count = np.array([len(way.path) for way in ways])
     first = np.cumsum(count) - count
+    room = scene.water[rows, cols] - np.repeat((of.half_a + of.half_b) / 2.0, count)
     water = np.log(np.maximum(scene.water[rows, cols], 0.5))
     mean = np.add.reduceat(water, first) / count
     off = water - np.repeat(mean, count)
     return {
+        "hugs": np.add.reduceat((np.abs(room - 1.0) <= _HUGS).astype(np.float64), first) / count,
+        "squeezed": np.add.reduceat((room < _SQUEEZED).astype(np.float64), first) / count,
         "specks": np.add.reduceat((scene.state[rows, cols] == OCCUPIED).astype(np.float64), first) / count,
         "log water": mean,
         "water ragged": np.sqrt(np.add.reduceat(off * off, first) / count),

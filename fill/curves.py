@@ -19,6 +19,8 @@ _STEP: Final = 0.25  # cells between two points of a curve
 _NOISE: Final = 0.4  # standard deviation of a centre line about its wall, cells
 _FLAT: Final = 1.0  # radians off the chord up to which a wall is a function of u
 _CORNER_FROM: Final = math.radians(40.0)
+_ALIGNED: Final = 1.7  # length of the sum of two directions that run alike
+_LEAST_STEP: Final = 2.0  # cells
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,6 +112,23 @@ def corner(a: End, b: End) -> list[Curve]:
         return []
     meet = (a.x + a.dx * max(from_a, 0.0), a.y + a.dy * max(from_a, 0.0))
     return [Curve("corner", sampled(np.array([(a.x, a.y), meet, (b.x, b.y)])))]
+
+
+def steps(a: End, b: End) -> list[Curve]:
+    """Two walls that run alike but not in line: one goes on until it is level with the other, and jogs over to it."""
+    along = np.array([a.dx - b.dx, a.dy - b.dy])
+    size = math.hypot(*along)
+    if size < _ALIGNED:
+        return []
+    along /= size
+    start, finish = np.array([a.x, a.y]), np.array([b.x, b.y])
+    ahead = float((finish - start) @ along)
+    aside = float(np.hypot(*(finish - start - ahead * along)))
+    if ahead < _LEAST_STEP or aside < _LEAST_STEP:
+        return []
+    places = (start + share * ahead * along for share in (1.0, 0.0, 0.5))
+    turns = [(place, place + (finish - start) - ahead * along) for place in places]
+    return [Curve("step", sampled(np.array([start, *turn, finish]))) for turn in turns]
 
 
 def tangent(a: End, b: End, between: Chord) -> Curve:

@@ -257,4 +257,4 @@ def _to_edge(
         if not (0 <= row < half.shape[0] and 0 <= col < half.shape[1]) or half[row, col] <= 0:
             break
         steps += 1
-    return 0.5 * steps
+    return max(0.5 * steps - 0.25, 0.0)  # the last place inside: one beyond may lie in water, which no way crosses

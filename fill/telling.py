@@ -22,8 +22,9 @@ _SHAPES: Final = {
     "cubic": "the wall goes on in two bends",
     "tangent": "the wall turns",
     "corner": "two walls meet in a corner",
-    "side": "the wall goes on to the side of another",
+    "step": "the wall goes on, and steps over to the other",
     "shore": "the wall follows the edge of the water",
+    "side": "the wall goes on to the side of another",
     "channel": "the wall runs between two waters",
 }
 

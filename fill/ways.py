@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fill.channels import channels
-from fill.curves import Chord, Curve, bowed, cells_of, chord, corner, polynomial, straight, tangent
+from fill.curves import Chord, Curve, bowed, cells_of, chord, corner, polynomial, steps, straight, tangent
 from fill.freedom import at, clear_path
 from fill.scene import Scene
 from fill.segments import End, cell_at
@@ -78,13 +78,12 @@ def across(a: End, b: End, scene: Scene) -> Drawn:
         way = _first_clear(curve, heights, (a, b), between, scene)
         if way is not None and _new(way, found):
             found.append(way)
-    led = not found
-    for curve in channels(a, b, scene) if led else []:
+    for curve in channels(a, b, scene):
         path = _path(curve, (a, b), scene)
         if path is not None:
             way = Way((a, b), False, between, curve, path, 0)
             found += [way] if _new(way, found) else []
-    return Drawn(found, np.concatenate([curve.points for curve in drawn]), min(highest, _BOWS.max()) + 2.0, led)
+    return Drawn(found, np.concatenate([curve.points for curve in drawn]), min(highest, _BOWS.max()) + 2.0, True)
 
 
 def onto_sides(a: End, scene: Scene, longest: float) -> Drawn:
@@ -95,8 +94,7 @@ def onto_sides(a: End, scene: Scene, longest: float) -> Drawn:
         row, col = cell_at(np.array([y, x])).tolist()
         gap = math.hypot(x - a.x, y - a.y)
         into = (a.x - x) / gap, (a.y - y) / gap
-        half = min(float(scene.walls.half[row, col]) - 0.5, a.half)
-        b = End(x, y, *into, half, a.line, a.length, a.wander, int(scene.walls.label[row, col]))
+        b = End(x, y, *into, a.half, a.line, a.length, a.wander, int(scene.walls.label[row, col]))
         curve = straight(a.x, a.y, x, y, "side")
         path = _path(curve, (a, b), scene)
         if path is not None:
@@ -112,7 +110,7 @@ def curves_between(a: End, b: End, between: Chord) -> list[Curve]:
         found.append(polynomial(a, b))
     if max(between.turn, steepest) > _BENT:
         found.append(tangent(a, b, between))
-    return found + corner(a, b)
+    return found + corner(a, b) + steps(a, b)
 
 
 def _first_clear(

@@ -20,6 +20,7 @@ from tools.bench import (
     fill_large,
     fill_times,
     holes,
+    holes_causes,
     holes_maps,
     holes_paper,
     holes_prior,
@@ -49,9 +50,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--maps", type=int, default=4, metavar="K", help="holes: damaged pieces per map (default: 4)")
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="holes: what is lost (default: 1)")
     parser.add_argument("--pictures", type=Path, metavar="DIR", help="holes: draw what was filled right and wrong")
+    parser.add_argument("--causes", action="store_true", help="holes: also why holes are not closed right, by gap")
     parser.add_argument("--paper-measure", action="store_true", help="holes: also the measure of the paper's table 1")
-    parser.add_argument("--fit-prior", type=Path, metavar="FILE", help="holes: fit the prior of certainties instead")
-    parser.add_argument("--keep-decisions", action="store_true", help="holes: with --fit-prior, certainties alone")
+    parser.add_argument("--fit-prior", type=Path, metavar="DIR", help="holes: fit the prior instead, into this folder")
     parser.add_argument("--json", action="store_true", help="print JSON lines")
 
 
@@ -122,9 +123,12 @@ def _holes(args: argparse.Namespace) -> Iterator[Row]:
         raise UsageError("--maps must be at least 1 and --seed at least 0")
     if args.fit_prior:
         seeds = range(args.seed, args.seed + args.seeds)
-        yield from holes_prior.fit_prior(args.data, seeds, args.maps, args.fit_prior, args.keep_decisions)
+        yield from holes_prior.fit_prior(args.data, seeds, args.maps, args.fit_prior)
         return
-    yield from holes.measure(holes.HoleOptions(args.data, args.half, args.seed, args.maps, args.pictures))
+    options = holes.HoleOptions(args.data, args.half, args.seed, args.maps, args.pictures)
+    yield from holes.measure(options)
+    if args.causes:
+        yield from holes_causes.measure_causes(holes.damaged_half(options))
     if args.paper_measure:
         yield from holes_paper.measure_as_paper(holes_maps.sources(args.data, args.half), args.seed)
 

@@ -34,7 +34,7 @@ def test_certainties_keep_within_their_bounds_however_odd_the_features() -> None
     belief = prior()
     random = np.random.default_rng(1)
     hole = random.normal(0.0, 100.0, len(HOLE_FEATURES))
-    cells = random.normal(0.0, 100.0, (50, (len(DESIGN) - len(HOLE_FEATURES)) // 3))
+    cells = random.normal(0.0, 100.0, (50, len(DESIGN) - len(HOLE_FEATURES)))
     (certainty,) = belief.certainties([belief.cell.log_odds(hole, cells)], [np.arange(50.0)])
     assert np.all((certainty >= np.float32(LOWEST)) & (certainty <= np.float32(HIGHEST)))
     assert LOWEST <= belief.hole_certainties([certainty])[0] <= HIGHEST
@@ -46,7 +46,7 @@ def test_beyond_the_longest_learnt_gap_less_is_told_the_longer_it_is() -> None:
     gap = HOLE_FEATURES.index("log gap")
     told = []
     for more in (0.0, 0.5, 1.0, 2.0):
-        hole[gap] = cell.high[gap] + more
+        hole[gap] = cell.longest + more
         told.append(cell.damped(hole))
     assert told[0] == 1.0
     assert told == sorted(told, reverse=True)

@@ -105,6 +105,7 @@ def test_a_way_between_two_chambers_stays_open_though_its_middle_was_not_seen(fi
     for left in (10, 68):  # two chambers with rock between them
         state[10:70, left : left + 54] = OCCUPIED
         state[13:67, left + 3 : left + 51] = FREE
+    state[27:53, 61:71] = OCCUPIED  # a passage through the rock, whose walls were seen
     state[30:50, 58:74] = UNKNOWN
     filled = fill(state)
     assert not np.any(filled.hole[36:44, 58:74] >= 0)

@@ -12,6 +12,7 @@ from PIL import Image
 
 from config.errors import InputError
 from mapping.values import FREE, OCCUPIED, UNKNOWN
+from tools.bench.holes_causes import causes
 from tools.bench.holes_damage import damage
 from tools.bench.holes_figures import figures, trust
 from tools.bench.holes_gates import find_gates, shut
@@ -195,3 +196,17 @@ def test_the_table_leaves_blank_what_was_not_measured() -> None:
     assert "legend" not in line({"method": "ours", "P": 0.5})
     assert line({"method": "ours", "P": 0.5}).split()[:3] == ["ours", "0.50", "-"]
     assert "WARNING" in line({"half": "tune", "WARNING": "flattered"})
+
+
+def test_every_hole_has_one_cause_and_a_plain_gap_is_closed_right() -> None:
+    state = np.full((60, 120), UNKNOWN, np.uint8)
+    state[20:23, 5:115] = OCCUPIED
+    state[23:55, 5:115] = FREE
+    seen = state.copy()
+    seen[18:26, 50:58] = UNKNOWN
+    line_there = np.stack([np.full(8, 21), np.arange(50, 58)], axis=1)
+    owner = np.zeros(state.shape, np.int32)
+    lost = Loss("stretch", line_there, 8.0, np.zeros((0, 3), np.int64))
+    assert causes(Damaged("plain", state, seen, (lost,), owner)) == [(8.0, "closed right")]
+    seen[15:30, 30:100] = FREE  # no way may cross the water
+    assert causes(Damaged("wet", state, seen, (lost,), owner)) == [(8.0, "no way drawn")]

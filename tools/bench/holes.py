@@ -44,13 +44,18 @@ class HoleOptions:
 def measure(options: HoleOptions) -> Iterator[Row]:
     """Yield what was measured on, then a row a method.  Raises InputError where there are no maps."""
     maps = sources(options.data, options.half)
-    cases = [case for source in maps for case in damaged_pieces(source, options)]
+    cases = damaged_half(options)
     yield _facts(options, maps, cases)
     verdicts = _judged(cases, options)
     for name in METHODS:
         random = np.random.default_rng(options.seed)
         found = figures([each[name] for each in verdicts], random)
         yield {"method": name} | {key: round(value, 4) for key, value in found.items() if not np.isnan(value)}
+
+
+def damaged_half(options: HoleOptions) -> list[Damaged]:
+    """Cut and damage pieces of every map of a half.  Raises InputError where there are no maps."""
+    return [case for source in sources(options.data, options.half) for case in damaged_pieces(source, options)]
 
 
 def damaged_pieces(source: Source, options: HoleOptions) -> list[Damaged]:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import multiprocessing
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -18,12 +17,13 @@ from scipy import ndimage
 from fill.candidates import FEATURES
 from fill.certainty import DESIGN, design_of
 from fill.closing import close_holes, fill_cells, open_walls
-from fill.logistic import Logistic
 from fill.matching import candidates
+from fill.trees import Trees
 from fill.witness import distances, witness
 from mapping.values import FREE, OCCUPIED
 from tools.bench.holes_damage import damage
 from tools.bench.holes_gates import shut
+from tools.bench.holes_judge import COVERED
 from tools.bench.holes_loss import ELSEWHERE, LONGEST, UNJUDGED, Damaged
 from tools.bench.holes_maps import pieces, read_state, sources
 from tools.bench.holes_rooms import drawn_rooms
@@ -34,7 +34,8 @@ _EIGHT: Final = np.ones((3, 3), np.int8)
 _WORKERS: Final = 2
 _ROOMS: Final = 4
 _FAR: Final = 0.8  # what a candidate far from any loss is worth as a lesson, beside one of a hole
-_OPENING: Final = 3.0  # and one that would shut an opening
+_OPENING: Final = 4.0  # and one that would shut an opening
+_PARTLY: Final = 0.5  # and one that is right, but leaves a part of the hole open
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +45,11 @@ class Case:
     place: str
     real: bool
     damaged: Damaged
+
+    @property
+    def fold(self) -> str:
+        """What is left out with it when a model is judged: its map, or all that is emulated."""
+        return self.place if self.real else "emulated"
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,10 +86,10 @@ def tried(found: Sequence[Case]) -> list[Tried]:
         return list(pool.map(_tried, found, chunksize=4))
 
 
-def filled(found: Sequence[Case], model: Logistic) -> list[Filling]:
-    """Close the holes with a model of candidates, and judge every filled cell near a loss."""
+def filled(found: Sequence[Case], models: Mapping[str, Trees]) -> list[Filling]:
+    """Close the holes by models that did not see the case's fold, and judge every filled cell near a loss."""
     with _pool() as pool:
-        return list(pool.map(partial(_filled, model=model), found, chunksize=4))
+        return list(pool.map(_filled, found, [models[case.fold] for case in found], chunksize=4))
 
 
 def _pool() -> ProcessPoolExecutor:
@@ -115,12 +121,20 @@ def _verdict(cells: NDArray[np.int32], damaged: Damaged, near: NDArray[np.bool_]
     if damaged.losses[loss].opening:
         solid = damaged.truth != FREE
         solid[rows, cols] = True
-        if shut(damaged.losses[loss].banks, solid):
-            return False, _OPENING
-    return bool(near[rows, cols].all()), 1.0
+        return False, _OPENING if shut(damaged.losses[loss].banks, solid) else 1.0
+    if not near[rows, cols].all():
+        return False, 1.0
+    return True, 1.0 if _covers(cells, damaged.losses[loss].line, damaged.seen.shape) else _PARTLY
 
 
-def _filled(case: Case, model: Logistic) -> Filling:
+def _covers(cells: NDArray[np.int32], line: NDArray[np.int64], shape: tuple[int, ...]) -> bool:
+    """Whether a fill closes the whole of a hole."""
+    layer = np.zeros(shape, bool)
+    layer[cells[:, 0], cells[:, 1]] = True
+    return float(ndimage.binary_dilation(layer, _EIGHT)[line[:, 0], line[:, 1]].mean()) >= COVERED
+
+
+def _filled(case: Case, model: Trees) -> Filling:
     damaged = case.damaged
     seen, near = damaged.seen, _near(damaged)
     designs, right, fill, away = (

@@ -1,12 +1,13 @@
-"""Fitting the prior of certainties to what became of fills in damaged maps: ``lacuna bench holes --fit-prior FILE``.
+"""Fitting the prior of certainties to what became of fills in damaged maps: ``lacuna bench holes --fit-prior DIR``.
 
-Each model is judged on places that it did not see: one map or site is left out at a time (several pieces and seeds of
-it together), and the figures are over all of them.  What is written is fitted to all.
+Each model is judged on places that it did not see: one map is left out at a time (several pieces and seeds of it
+together), or all that is emulated, and the figures are over all of them.  Certainties are fitted to fills that were
+chosen by models which had not seen their place, for what a model says of its own lessons is too good.  What is written
+is fitted to all; the same command writes the same bytes.
 """
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,112 +19,100 @@ from numpy.typing import NDArray
 from fill.candidates import FEATURES
 from fill.certainty import DESIGN, HIGHEST, LOWEST, falling, log_odds, whole_features
 from fill.logistic import Logistic, sigmoid
-from fill.prior import prior
+from fill.trees import planted
 from tools.bench.holes_outcomes import Case, Filling, Tried, cases, filled, tried
+from tools.bench.holes_trees import Grown, Growth, grow, table
 from tools.files import replace_file
 
 Row = dict[str, str | int | float]
 Floats = NDArray[np.float64]
 
-_RIDGE_CELLS: Final = 10.0
-_RIDGE_HOLES: Final = 5.0
+_HOLES: Final = Growth(count=100, depth=4, rate=0.15, ridge=5.0)
+_CELLS: Final = Growth(count=120, depth=3, rate=0.1, ridge=10.0)
+_RIDGE_WHOLE: Final = 1.0
 _STEPS: Final = 12
-_TAIL: Final = 0.002  # of what was seen lies beyond either edge of the learnt range
+_TAIL: Final = 0.002  # of what was seen is longer than what counts as learnt
 _LEAST_SD: Final = (0.2, 0.1)  # sites differ at least so much in level and slope
 _BINS: Final = 10
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One model's lessons: ``x`` ``(n, k)``, ``right`` and ``count`` ``(n,)``, and the ``place`` ``(n,)`` of each."""
+    """One model's lessons: ``x`` ``(n, k)``, ``right`` and ``count`` ``(n,)``, and the ``fold`` ``(n,)`` of each."""
 
     x: Floats
     right: Floats
     count: Floats
-    place: NDArray[np.str_]
+    fold: NDArray[np.str_]
     real: NDArray[np.bool_]
-    ridge: float
+
+    def without(self, fold: str) -> Task:
+        """Return the lessons of all other folds."""
+        kept = self.fold != fold
+        return Task(self.x[kept], self.right[kept], self.count[kept], self.fold[kept], self.real[kept])
 
 
-@dataclass(frozen=True, slots=True)
-class Tables:
-    """What is written: weights, ranges, and how much sites differ."""
-
-    hole: Floats
-    cell: Floats
-    low: Floats
-    high: Floats
-    site_covariance: Floats
-    whole: Floats
-
-
-def fit_prior(data: Path, seeds: Sequence[int], pieces: int, out: Path, keep: bool = False) -> Iterator[Row]:
-    """Collect outcomes, yield figures of places left out, and write the tables fitted to all as a Python module.
-
-    With ``keep`` the weights of candidates stay as they are, and only certainties are fitted, to what those close.
-    """
+def fit_prior(data: Path, seeds: Sequence[int], pieces: int, out: Path) -> Iterator[Row]:
+    """Collect outcomes, yield figures of places left out, and write the tables fitted to all as Python modules."""
     found = cases(data, seeds, pieces)
-    weights, facts = prior().hole.weights, "kept candidates"
-    if not keep:
-        holes = _hole_task(found, tried(found))
-        yield _figures("candidates", holes, left_out(holes))
-        weights, facts = fitted(holes), f"{len(holes.right)} candidates"
-    fillings = filled(found, Logistic(weights, np.eye(len(weights))))
+    places = sorted({each.place for each in found if each.real})
+    holes = _hole_task(found, tried(found))
+    others = {fold: grow_on(holes.without(fold), _HOLES) for fold in np.unique(holes.fold).tolist()}
+    yield _figures("candidates", holes, left_out(holes, others))
+    chosen = {fold: planted(table(grown, FEATURES), FEATURES) for fold, grown in others.items()}
+    fillings = filled(found, {each.fold: chosen[each.fold] for each in found})
     fills = _fills(fillings)
     cells = _cell_task(found, fillings, fills)
-    told = left_out(cells)
+    told = left_out(cells, {fold: grow_on(cells.without(fold), _CELLS) for fold in np.unique(cells.fold).tolist()})
     yield _figures("cells", cells, told)
     fallen = _fallen(told, fills, np.concatenate([each.away for each in fillings]))
     yield _figures("cells, falling", cells, fallen)
     whole = _whole_task(cells, fills, fallen)
-    yield _figures("whole fills", whole, left_out(whole))
-    spread = site_covariance(cells, told)
+    spread = site_covariance(cells, fallen)
     yield {
         "model": "sites differ",
         "level_sd": round(spread[0, 0] ** 0.5, 3),
         "slope_sd": round(spread[1, 1] ** 0.5, 3),
     }
-    low, high = np.quantile(cells.x, [_TAIL, 1.0 - _TAIL], axis=0)
-    tables = Tables(weights, fitted(cells), low, high, spread, fitted(whole))
-    facts += f" and {len(cells.right)} filled cells"
-    replace_file(out, module(tables, facts, sorted({each.place for each in found if each.real})).encode())
+    facts = f"{len(holes.right)} ways to close holes of {len(places)} real maps\n({', '.join(places)})"
+    _write(out / "prior_holes.py", facts, grow_on(holes, _HOLES), FEATURES, [])
+    longest = float(np.quantile(cells.x[:, DESIGN.index("log gap")], 1.0 - _TAIL))
+    more = [
+        f"LONGEST: Final = {longest:.4f}",
+        '"""Logarithm of the longest gap that was learnt on, in cells."""',
+        f"WHOLE: Final = ({', '.join(f'{value:.4f}' for value in fitted(whole))})",
+        f"SITE_SD: Final = ({', '.join(f'{value:.4f}' for value in np.sqrt(np.diag(spread)))})",
+    ]
+    facts = f"{len(cells.right)} filled cells of {len(places)} real maps\n({', '.join(places)})"
+    _write(out / "prior_cells.py", facts, grow_on(cells, _CELLS), DESIGN, more)
+
+
+def grow_on(task: Task, growth: Growth) -> Grown:
+    """Grow trees on all lessons of a task."""
+    return grow(task.x, task.right, task.count, growth)
+
+
+def left_out(task: Task, others: dict[str, Grown]) -> Floats:
+    """Chances ``(n,)`` of each fold's lessons by a model of all others."""
+    told = np.empty(len(task.right))
+    for fold, grown in others.items():
+        here = task.fold == fold
+        told[here] = sigmoid(grown.log_odds(task.x[here]))
+    return np.clip(told, LOWEST, HIGHEST)
 
 
 def fitted(task: Task) -> Floats:
-    """Return the weights ``(k,)`` of a logistic model with a ridge on its standardised features; column 0 is one."""
-    middle, scale = task.x.mean(axis=0), task.x.std(axis=0)
-    middle[0], scale[0] = 0.0, 1.0
-    live = scale > 1e-9
-    x = np.where(live, (task.x - middle) / np.where(live, scale, 1.0), 0.0)
-    ridge = np.full(x.shape[1], task.ridge)
+    """Return the weights ``(k,)`` of a logistic model; column 0 is one and has no ridge."""
+    ridge = np.full(task.x.shape[1], _RIDGE_WHOLE)
     ridge[0] = 1e-6
-    weights = np.zeros(x.shape[1])
-    for _ in range(_STEPS):
-        chance = sigmoid(x @ weights)
-        slope = x.T @ (task.count * (task.right - chance)) - ridge * weights
-        curvature = (x * (task.count * chance * (1.0 - chance))[:, None]).T @ x + np.diag(ridge)
-        weights += np.linalg.solve(curvature, slope)
-    raw = np.where(live, weights / np.where(live, scale, 1.0), 0.0)
-    raw[0] -= float(raw[1:] @ middle[1:])
-    return raw
-
-
-def left_out(task: Task) -> Floats:
-    """Chances ``(n,)`` of each place's lessons by a model of all others."""
-    told = np.empty(len(task.right))
-    for place in np.unique(task.place):
-        here = task.place == place
-        others = dataclasses.replace(task, x=task.x[~here], right=task.right[~here], count=task.count[~here])
-        low, high = np.quantile(others.x, [_TAIL, 1.0 - _TAIL], axis=0)
-        told[here] = sigmoid(np.clip(task.x[here], low, high) @ fitted(others))
-    return np.clip(told, LOWEST, HIGHEST)
+    return Logistic(np.zeros(len(ridge)), np.diag(ridge)).taught(task.x, task.right, task.count).weights
 
 
 def site_covariance(task: Task, told: Floats) -> Floats:
     """Covariance ``(2, 2)`` of level and slope between places: their scatter less what chance alone makes of it."""
     found, noise = [], []
-    for place in np.unique(task.place[task.real]):
-        here = task.place == place
+    for fold in np.unique(task.fold[task.real]):
+        here = task.fold == fold
         x = np.stack([np.ones(int(here.sum())), log_odds(told[here])], axis=1)
         weights = np.array([0.0, 1.0])
         curvature = np.eye(2)
@@ -138,49 +127,45 @@ def site_covariance(task: Task, told: Floats) -> Floats:
     return np.diag(np.maximum(np.diag(scatter), np.array(_LEAST_SD) ** 2))
 
 
-def module(tables: Tables, facts: str, places: Sequence[str]) -> str:
-    """Return the tables as the text of a Python module."""
+def _write(path: Path, facts: str, grown: Grown, names: tuple[str, ...], more: list[str]) -> None:
+    """Write trees as a Python module that ``fill.trees.planted`` reads."""
+    trees = table(grown, names)
     lines = [
-        '"""Weights of the prior, written by ``lacuna bench holes --fit-prior``: do not edit.',
+        '"""Trees of the prior, written by ``lacuna bench holes --fit-prior``: do not edit.',
         "",
-        f"Fitted to {facts} of {len(places)} real maps",
-        f"({', '.join(places)})",
-        "nine emulated sites and drawn floor plans.",
+        f"Fitted to {facts},",
+        "of emulated sites and of drawn floor plans.",
         '"""',
         "",
         "from __future__ import annotations",
         "",
         "from typing import Final",
         "",
-        "HOLE: Final = {",
-        *(f'    "{name}": {value:.4f},' for name, value in zip(FEATURES, tables.hole, strict=True)),
-        "}",
-        "CELL: Final = {",
-        *(
-            f'    "{name}": ({value:.5f}, {low:.4f}, {high:.4f}),'
-            for name, value, low, high in zip(DESIGN, tables.cell, tables.low, tables.high, strict=True)
-        ),
-        "}",
-        '"""Weight, and the range in which it was learnt."""',
-        f"WHOLE: Final = ({', '.join(f'{value:.4f}' for value in tables.whole)})",
-        f"SITE_SD: Final = ({', '.join(f'{value:.4f}' for value in np.sqrt(np.diag(tables.site_covariance)))})",
+        "from fill.trees import Table",
+        "",
+        *more,
+        "TREES: Final = Table(",
+        f'    """{trees.features}""",',
+        f'    """{trees.cuts}""",',
+        f'    """{trees.trees}""",',
+        ")",
         "",
     ]
-    return "\n".join(lines)
+    replace_file(path, "\n".join(lines).encode())
 
 
 def _hole_task(found: list[Case], lessons: list[Tried]) -> Task:
     x, right = (np.concatenate([getattr(each, name) for each in lessons]) for name in ("features", "right"))
     sizes = [len(each.right) for each in lessons]
     worth = np.concatenate([each.worth for each in lessons])
-    return Task(x, right.astype(np.float64), worth, *_places(found, sizes), _RIDGE_HOLES)
+    return Task(x, right.astype(np.float64), worth, *_folds(found, sizes))
 
 
 def _cell_task(found: list[Case], lessons: list[Filling], fills: NDArray[np.int64]) -> Task:
     x, right = (np.concatenate([getattr(each, name) for each in lessons]) for name in ("design", "right"))
     count = 1.0 / np.sqrt(np.bincount(fills)[fills])  # cells of one fill are right or wrong together
-    places = _places(found, [len(each.right) for each in lessons])
-    return Task(x.astype(np.float64), right.astype(np.float64), count, *places, _RIDGE_CELLS)
+    folds = _folds(found, [len(each.right) for each in lessons])
+    return Task(x.astype(np.float64), right.astype(np.float64), count, *folds)
 
 
 def _whole_task(cells: Task, fills: NDArray[np.int64], told: Floats) -> Task:
@@ -188,11 +173,11 @@ def _whole_task(cells: Task, fills: NDArray[np.int64], told: Floats) -> Task:
     parts = np.split(np.arange(len(fills)), starts[1:])
     x = whole_features([told[part].astype(np.float32) for part in parts])
     right = np.array([cells.right[part].all() for part in parts], np.float64)
-    return Task(x, right, np.ones(len(right)), cells.place[starts], cells.real[starts], 1.0)
+    return Task(x, right, np.ones(len(right)), cells.fold[starts], cells.real[starts])
 
 
-def _places(found: list[Case], sizes: list[int]) -> tuple[NDArray[np.str_], NDArray[np.bool_]]:
-    return np.repeat([each.place for each in found], sizes), np.repeat([each.real for each in found], sizes)
+def _folds(found: list[Case], sizes: list[int]) -> tuple[NDArray[np.str_], NDArray[np.bool_]]:
+    return np.repeat([each.fold for each in found], sizes), np.repeat([each.real for each in found], sizes)
 
 
 def _fills(lessons: list[Filling]) -> NDArray[np.int64]:

@@ -42,6 +42,8 @@ def line(row: Row) -> str:
     """Return a line of the table; the row of facts comes with the legend and the head of the table."""
     if "size_of" in row:
         return "paper's measure: " + ", ".join(f"{key} {value}" for key, value in row.items())
+    if "gap" in row:
+        return "holes: " + ", ".join(f"{key} {value}" for key, value in row.items())
     if "model" in row:
         return "prior: " + ", ".join(f"{key} {value}" for key, value in row.items())
     if "method" not in row:
