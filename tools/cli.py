@@ -31,6 +31,13 @@ COMMANDS: Final[dict[str, tuple[str, str]]] = {
 """Name of each command, its module, and what it does in one line."""
 
 
+ONE_THREAD: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+"""Numerical libraries read these when they are loaded, in this process and in those that it starts.
+
+How a sum is shared among threads changes its last bits: the same log must give the same bytes on any number of cores.
+"""
+
+
 class Command(Protocol):
     """What a command's module offers."""
 
@@ -52,6 +59,7 @@ class Parser(argparse.ArgumentParser):
 def main(argv: list[str] | None = None) -> int:
     """Run ``lacuna COMMAND ...`` and return its exit code (design section 5: codes after sysexits.h)."""
     words = sys.argv[1:] if argv is None else argv
+    os.environ |= dict.fromkeys(ONE_THREAD, "1")
     try:
         return _dispatch(words)
     except LacunaError as error:

@@ -1,8 +1,11 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import socket
+import subprocess
+import sys
 import threading
 from pathlib import Path
 
@@ -13,7 +16,7 @@ from config.schema import Config
 from daemon.wire import Message, decode
 from drivers.log import LogWriter, read_header
 from drivers.records import ClockPair
-from tools.cli import main
+from tools.cli import ONE_THREAD, main
 
 
 def free_port() -> int:
@@ -36,6 +39,13 @@ def test_the_same_log_gives_the_same_files(dive_log: Path, tmp_path: Path, capsy
     assert report["stations"] == {"placed": 2}
     assert files(tmp_path / "a") == files(tmp_path / "b")
     assert {"map.pgm", "filled.yaml", "fills.csv", "poses.csv", "mesh.ply", "plan.png"} <= set(files(tmp_path / "a"))
+
+
+def test_the_number_of_threads_that_somebody_set_changes_no_byte(dive_log: Path, tmp_path: Path) -> None:
+    for threads in ("1", "4"):
+        words = [sys.executable, "-m", "tools.cli", "replay", str(dive_log), "-o", str(tmp_path / threads)]
+        subprocess.run(words, check=True, env=os.environ | dict.fromkeys(ONE_THREAD, threads), capture_output=True)
+    assert files(tmp_path / "1") == files(tmp_path / "4")
 
 
 def test_a_replay_on_the_air_is_a_live_dive(dive_log: Path, tmp_path: Path) -> None:
