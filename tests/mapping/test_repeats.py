@@ -23,7 +23,7 @@ HERE = Pose(0.0, 0.0, 0.0)
 def circle(index: int, x_m: float = -1.2, heading_rad: float = 0.0) -> Scan:
     """A circle in the house's cistern; speckle hangs on the place, noise on the ping's number."""
     model = EchoModel(SITES["house"](), 7)
-    bearing = np.arange(200) * STEP_RAD
+    bearing = STEP_RAD * np.arange(200, dtype=np.float64)
     place, sampling = Place(x_m, -0.5, 1.0, heading_rad), Sampling(BIN_M, 240)
     echoes = np.stack([model.ping(place, float(b), sampling, 1000 * index + i) for i, b in enumerate(bearing)])
     return Scan(index, index, index + 1, heading_rad, 1.0, bearing, echoes, BIN_M, STEP_RAD, "full")
