@@ -4,12 +4,26 @@ from __future__ import annotations
 
 import bisect
 import math
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 KEEP_NS = 120_000_000_000
 """Readings older than this are forgotten: a circle of the slowest head takes less."""
+
+
+SHARES: Final = (1.0, 0.8, 0.8, 0.3, 0.3)
+"""What is known before of a compass's bias and of each wave's amplitude, in standard deviations of its error."""
+
+
+def waves_of(heading_rad: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Give the waves ``(n, 5)`` by which a compass's error goes with the heading: one, and two of one and two cycles.
+
+    Iron of the vehicle that is magnetic makes one cycle to the turn, and soft iron two.
+    """
+    waves = [np.ones_like(heading_rad), *(wave(k * heading_rad) for k in (1, 2) for wave in (np.sin, np.cos))]
+    return np.stack(waves, axis=1)
 
 
 def wrap(angle_rad: float) -> float:

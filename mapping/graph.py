@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from mapping.compass import wrap
+from mapping.compass import SHARES, waves_of, wrap
 from mapping.values import Pose
 from mapping.view import from_map, to_map
 
@@ -34,6 +34,8 @@ Floats = NDArray[np.float64]
 
 SWAY_RAD = math.radians(0.5)
 """Heading of a scan against that of its walls: a vehicle at rest sways, and a scan has one heading."""
+NOISE = 0.25
+"""How far a compass strays from its curve, in standard deviations of its error."""
 SCALE = 0.01
 """All ranges may be too long or too short by this share, with the speed of sound: no tie between stations tells."""
 
@@ -50,7 +52,10 @@ class Tie:
 
 @dataclass(frozen=True, slots=True)
 class Compass:
-    """What the compass said at each station, clockwise from its own north, and how far it is to be trusted."""
+    """What the compass said at each station, clockwise from its own north, and how far it is to be trusted.
+
+    Its error goes with the heading, by the curve of `mapping.swing`: stations of one heading share it.
+    """
 
     heading_rad: Mapping[int, float]
     sd_rad: float
@@ -113,19 +118,19 @@ def solve(poses: Mapping[int, Pose], ties: Sequence[Tie], compass: Compass) -> S
     at = np.array([[place[tie.one], place[tie.other]] for tie in ties], dtype=np.intp).reshape(-1, 2)
     told = np.array([compass.heading_rad[k] for k in stations])
     start = np.array([[p.x_m, p.y_m, p.heading_rad] for p in poses.values()])
-    state, north = start.copy(), 0.0
+    state, waves = start.copy(), np.zeros(len(SHARES))
     for _ in range(ROUNDS):
         blocks, right = _of_ties(state, at, ties)
-        normal, right = _equations(state, blocks, right, (told, north, compass.sd_rad))
-        right[:-1] += LOOSE * (start - state)[1:].ravel()
+        normal, right = _equations(state, blocks, right, (told, waves, compass.sd_rad))
+        right[: -len(waves)] += LOOSE * (start - state)[1:].ravel()
         step = splu(normal).solve(right)
-        state[1:] += step[:-1].reshape(-1, 3)
-        north += float(step[-1])
+        state[1:] += step[: -len(waves)].reshape(-1, 3)
+        waves += step[-len(waves) :]
         if np.abs(step).max() < SETTLED:
             break
-    normal, _ = _equations(state, *_of_ties(state, at, ties), (told, north, compass.sd_rad))
+    normal, _ = _equations(state, *_of_ties(state, at, ties), (told, waves, compass.sd_rad))
     covariance = np.zeros((3 * len(stations), 3 * len(stations)))
-    inverse = splu(normal).solve(np.eye(normal.shape[0]))[:-1, :-1]
+    inverse = splu(normal).solve(np.eye(normal.shape[0]))[: -len(waves), : -len(waves)]
     covariance[3:, 3:] = 0.5 * (inverse + inverse.T)
     solved = tuple(Pose(float(x), float(y), float(h) % (2.0 * math.pi)) for x, y, h in state)
     return Solution(stations, solved, covariance)
@@ -162,20 +167,29 @@ def _linear(state: Floats, at: NDArray[np.intp], ties: Sequence[Tie]) -> tuple[F
 
 
 def _equations(
-    state: Floats, blocks: sparse.coo_array, right: Floats, compass: tuple[Floats, float, float]
+    state: Floats, blocks: sparse.coo_array, right: Floats, compass: tuple[Floats, Floats, float]
 ) -> tuple[sparse.csc_array, Floats]:
-    """Add what the compass says; unknown are all stations but the first, and last the compass's north."""
+    """Add what the compass says; unknown are all stations but the first, and last the waves of the compass's curve."""
     n = len(state)
-    told, north, sd_rad = compass
-    astray = _wrapped(state[:, 2] - told - north)
-    trust = 1.0 / (sd_rad**2 * (1.0 + (astray / (ROBUST * sd_rad)) ** 2))
-    turned, last = 3 * np.arange(n) + 2, np.full(n, 3 * n)
-    right = np.append(right, trust @ astray)
+    told, waves, sd_rad = compass
+    by = waves_of(told)
+    astray = _wrapped(state[:, 2] - told - by @ waves)
+    noise_rad = NOISE * sd_rad
+    trust = 1.0 / (noise_rad**2 * (1.0 + (astray / (ROBUST * noise_rad)) ** 2) ** 2)
+    known = 1.0 / (sd_rad * np.array(SHARES)) ** 2
+    known[0] = LOOSE
+    turned, last = 3 * np.arange(n) + 2, 3 * n + np.arange(len(waves))
+    weighed = by * trust[:, None]
+    right = np.append(right, weighed.T @ astray - known * waves)
     right[turned] -= trust * astray
-    value = np.concatenate([blocks.data, trust, -trust, -trust, trust, np.full(3 * n, LOOSE)])
-    row = np.concatenate([blocks.coords[0], turned, turned, last, last, np.arange(3 * n)])
-    col = np.concatenate([blocks.coords[1], turned, last, turned, last, np.arange(3 * n)])
-    whole = sparse.csc_array((value, (row, col)), shape=(3 * n + 1, 3 * n + 1))
+    rows, cols = np.repeat(turned, len(waves)), np.tile(last, n)
+    inner = weighed.T @ by + np.diag(known)
+    value = np.concatenate(
+        [blocks.data, trust, -weighed.ravel(), -weighed.ravel(), inner.ravel(), np.full(3 * n, LOOSE)]
+    )
+    row = np.concatenate([blocks.coords[0], turned, rows, cols, np.repeat(last, len(waves)), np.arange(3 * n)])
+    col = np.concatenate([blocks.coords[1], turned, cols, rows, np.tile(last, len(waves)), np.arange(3 * n)])
+    whole = sparse.csc_array((value, (row, col)), shape=(3 * n + len(waves), 3 * n + len(waves)))
     return sparse.csc_array(whole[3:, 3:]), right[3:]
 
 

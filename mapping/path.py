@@ -22,8 +22,12 @@ ACCELERATION_M_S2 = 0.25
 END_SPEED_M_S = 0.05
 REST_M = 0.05
 """A scan is made from a mean place of its rest, and the way begins where the rest ended."""
-COMPASS_RAD = math.radians(0.7)
-"""The compass's error wanders by this in ``KNOT_S``: it goes with the heading, and with iron nearby."""
+COMPASS_RAD = math.radians(0.2)
+"""The compass's error wanders by this in ``KNOT_S``, with iron nearby ..."""
+DEVIATION = 0.07
+"""... and by this share of what the vehicle turns on the way: it goes with the heading."""
+SWAY_RAD = math.radians(0.5)
+"""A scan has one heading, and a vehicle at rest sways."""
 SIGMA_M = 0.03
 """Of a mark across its wall ..."""
 ROBUST_M = 0.06
@@ -88,16 +92,19 @@ class Bonds:
     off_m: Floats
 
 
-def inertia(seconds: float, knots: int) -> Floats:
-    """Information ``(3 states, 3 states)`` of how a vehicle moves: rests, accelerations and the compass."""
+def inertia(seconds: float, knots: int, turned_rad: float) -> Floats:
+    """Information ``(3 states, 3 states)`` of how a vehicle moves: rests, accelerations and the compass.
+
+    ``turned_rad`` is how far its headings at the two rests are apart.
+    """
     dt = seconds / (knots - 1)
     count = knots + 2
     spread = ACCELERATION_M_S2 * dt**2 * math.sqrt(KNOT_S / dt)
     rows: list[tuple[dict[int, float], float]] = [({k - 1: 1.0, k: -2.0, k + 1: 1.0}, spread) for k in range(2, knots)]
     rows += [({k: -1.0, k + 1: 1.0}, END_SPEED_M_S * dt) for k in (1, knots - 1)]
     rows += [({k: -1.0, k + 1: 1.0}, REST_M) for k in (0, knots)]
-    wander = COMPASS_RAD * math.sqrt(dt / KNOT_S)
-    turns = [({k: -1.0, k + 1: 1.0}, wander if 0 < k < knots else COMPASS_RAD) for k in range(count - 1)]
+    wander = math.hypot(COMPASS_RAD * math.sqrt(dt / KNOT_S), DEVIATION * turned_rad / math.sqrt(knots - 1))
+    turns = [({k: -1.0, k + 1: 1.0}, wander if 0 < k < knots else SWAY_RAD) for k in range(count - 1)]
     information = np.zeros((count, 3, count, 3))
     for axis, of_axis in ((0, rows), (1, rows), (2, turns)):
         row = np.zeros((len(of_axis), count))

@@ -16,13 +16,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from mapping.compass import wrap
+from mapping.compass import SHARES, waves_of, wrap
 from mapping.prior import Prior
 from mapping.values import Station
 
 USUAL_SD_RAD: Final = math.radians(4.0)
-SHARES: Final = (1.0, 0.8, 0.8, 0.3, 0.3)
-"""What is known before of the bias and of each wave's amplitude, in standard deviations of the compass."""
 NOISE_RAD: Final = math.radians(1.0)
 """How far a compass wanders about its curve, and a registered heading about the truth."""
 LET_GO: Final = 3.0
@@ -50,7 +48,7 @@ class Swing:
 
     def at(self, compass_rad: float) -> tuple[float, float]:
         """Return what to add to a heading as read, and its standard deviation."""
-        row = _design(np.array([compass_rad]))[0]
+        row = waves_of(np.array([compass_rad]))[0]
         return float(row @ self.waves), math.sqrt(float(row @ self.covariance @ row))
 
     @property
@@ -66,7 +64,7 @@ class Swing:
     @property
     def deviation_rad(self) -> tuple[float, float]:
         """Largest deviation from the bias at any heading, and its standard deviation."""
-        design = _design(np.radians(np.arange(0.0, 360.0, 5.0)))
+        design = waves_of(np.radians(np.arange(0.0, 360.0, 5.0)))
         design[:, 0] = 0.0
         most = int(np.abs(design @ self.waves).argmax())
         sd = math.sqrt(float(design[most] @ self.covariance @ design[most]))
@@ -90,7 +88,7 @@ def swung(read_rad: Sequence[float], heading_rad: Sequence[float], compass_sd_ra
     first = heading_rad[0] - read_rad[0] if len(read) else 0.0
     add = np.array([wrap(h - r - first) for h, r in zip(heading_rad, read_rad, strict=True)], dtype=np.float64)
     middle = float(np.median(add)) if len(add) else 0.0
-    design, off = _design(read), add - middle
+    design, off = waves_of(read), add - middle
     known = np.diag(1.0 / (compass_sd_rad * np.array(SHARES)) ** 2)
     for _ in range(ROUNDS):
         weight = (1.0 + (off / (LET_GO * NOISE_RAD)) ** 2) ** -2 / NOISE_RAD**2
@@ -104,9 +102,3 @@ def swung(read_rad: Sequence[float], heading_rad: Sequence[float], compass_sd_ra
 def is_turned(heading_rad: float, prior: Prior) -> bool:
     """Whether a scan fits so far off its compass that the compass is in doubt."""
     return abs(wrap(heading_rad - prior.heading_rad)) > SUSPECT * prior.heading_sd_rad
-
-
-def _design(heading_rad: Floats) -> Floats:
-    one = np.ones_like(heading_rad)
-    waves = [one, *(wave(k * heading_rad) for k in (1, 2) for wave in (np.sin, np.cos))]
-    return np.stack(waves, axis=1)

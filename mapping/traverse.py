@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.schema import Map
+from mapping.compass import wrap
 from mapping.course import HULL_M, LEAST_KNOWN, THROUGH, Course, agreement, course_of
 from mapping.path import HERE, THERE, WITNESS, Floats, improve, inertia
 from mapping.prior import Cloud
@@ -82,7 +83,8 @@ def traverse(here: Sight, there: Sight, way: Way, config: Map) -> Cloud | None:
     if rise_m(here.scan, there.scan) > RISE_M:
         return None
     course = course_of(here, there, way, config)
-    prior = inertia(course.seconds, course.knots)
+    turned_rad = wrap(there.scan.heading_rad - here.scan.heading_rad)
+    prior = inertia(course.seconds, course.knots, turned_rad)
     settled = [settle(start, course, prior) for start in sketch(course, BEYOND * config.reach_m)]
     height = np.array([each.height for each in settled])
     weight = np.exp(TEMPER * (height - height.max()))

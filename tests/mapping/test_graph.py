@@ -118,3 +118,27 @@ def test_one_station_alone_is_solved() -> None:
     solved = solve({5: Pose(1.0, 2.0, 3.0)}, [], Compass({5: 3.1}, 0.1))
     assert solved.poses == (Pose(1.0, 2.0, 3.0),)
     assert not solved.covariance.any()
+
+
+def test_stations_of_one_heading_share_the_error_of_the_compass() -> None:
+    """A long straight chain is bent by its ties; a compass as far off at all of them holds it straight."""
+    rng = np.random.default_rng(4)
+    off = math.radians(3.0)
+    places = [Pose(2.0 * k, 0.0, 1.0) for k in range(25)]
+    seen = [seen_from(a, b) for a, b in pairwise(places)]
+    bends = rng.normal(math.radians(0.5), math.radians(1.0), len(seen))
+    loose = np.diag([1.0 / 0.02**2, 1.0 / 0.02**2, 1.0 / math.radians(1.0) ** 2])
+    ties = [
+        Tie(k, k + 1, Pose(p.x_m, p.y_m, p.heading_rad + b), loose)
+        for k, (p, b) in enumerate(zip(seen, bends, strict=True))
+    ]
+    start = {0: places[0]}
+    for tie in ties:
+        start[tie.other] = put_at(start[tie.one], tie.pose)
+    solved = solve(start, ties, Compass({k: p.heading_rad + off for k, p in enumerate(places)}, math.radians(4.0)))
+    turned = [math.degrees(p.heading_rad - 1.0) for p in solved.poses]
+    assert abs(start[24].heading_rad - 1.0) > math.radians(8.0)
+    assert max(map(abs, turned)) < 2.5
+    assert math.hypot(solved.poses[-1].x_m - 48.0, solved.poses[-1].y_m) < 3.0 * math.sqrt(
+        float(np.linalg.eigvalsh(solved.of(24)[:2, :2])[-1])
+    )

@@ -98,7 +98,7 @@ def test_a_path_that_is_a_little_wrong_settles_where_the_vehicle_went(keyhole: t
     path = np.zeros((course.knots + 2, 3))
     path[1:-1, :2] = np.linspace(0.0, 1.0, course.knots)[:, None] * [-0.1, 1.7]
     path[-1, :2] = (-0.1, 1.7)
-    prior = inertia(course.seconds, course.knots)
+    prior = inertia(course.seconds, course.knots, 0.0)
     settled = path
     for within_m in (0.3, 0.15):
         settled, information = improve(settled, course.marks.along(settled), prior, within_m, 3)
