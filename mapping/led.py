@@ -19,8 +19,8 @@ LED_MARGIN, LED_OVERLAP, LED_FIT = 3.0, 0.2, 0.1
 SLIDES = 0.12
 """Information along the weakest axis (0.5 is the most) below which walls are not asked where along it a scan was made:
 wherever smooth walls lie on smooth walls, what differs least is the scan that did not move."""
-WAY_SD_M = 1.0
-"""Where the way tells no more surely than this where a scan was made, it is no place ..."""
+WAY_SD_M = 0.5
+"""Where the way tells no more surely than this where a scan was made, it is no place, for walls are drawn by it ..."""
 WAY_FIT, WAY_OVERLAP = 0.1, 0.2
 """... nor where what was seen there does not fit."""
 
