@@ -41,12 +41,12 @@ JOIN_M = 0.12
 """Neighbouring returns are one wall where their ranges differ by no more than this ..."""
 JOIN_SLOPE = 2.5
 """... or by this times the arc between them (68 degrees of incidence) ..."""
-LEAST_SQUARE = 0.2
-"""A wall is not taken to be met at more of a slant than this cosine of incidence."""
 JOIN_STEEPEST = 5.0
 """... or by this times it (79 degrees), where they lie on a straight line with the return before or after ..."""
 JOIN_BENT = 0.25
 """... but for this share of their difference."""
+LEAST_SQUARE = 0.2
+"""A wall is not taken to be met at more of a slant than this cosine of incidence."""
 SPREAD = 0.08
 """Share of the arc within the beam by which an oblique wall's range is unsure."""
 

@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 
 KEEP_NS = 120_000_000_000
 """Readings older than this are forgotten: a circle of the slowest head takes less."""
-
-
 SHARES: Final = (1.0, 0.8, 0.8, 0.3, 0.3)
 """What is known before of a compass's bias and of each wave's amplitude, in standard deviations of its error."""
 

@@ -100,14 +100,26 @@ def test_a_doorway_seen_open_stays_open(room: State, fill: Fills) -> None:
     assert not np.any(filled.hole[2:15, 50:66] >= 0)
 
 
-def test_a_way_between_two_chambers_stays_open_though_its_middle_was_not_seen(fill: Fills) -> None:
+def two_chambers() -> State:
+    """Two chambers with rock between them, and 20 cells of it never seen."""
     state = np.full((80, 140), UNKNOWN, np.uint8)
-    for left in (10, 68):  # two chambers with rock between them
+    for left in (10, 68):
         state[10:70, left : left + 54] = OCCUPIED
         state[13:67, left + 3 : left + 51] = FREE
-    state[27:53, 61:71] = OCCUPIED  # a passage through the rock, whose walls were seen
     state[30:50, 58:74] = UNKNOWN
+    return state
+
+
+def test_a_way_between_two_chambers_stays_open_though_its_middle_was_not_seen(fill: Fills) -> None:
+    state = two_chambers()
+    state[27:30, 61:71] = state[50:53, 61:71] = OCCUPIED  # a passage through the rock, whose walls were seen
     filled = fill(state)
+    assert not np.any(filled.hole[36:44, 58:74] >= 0)
+
+
+@pytest.mark.xfail(strict=True, reason="where no wall of a passage was seen, both chambers' walls are drawn across it")
+def test_a_way_between_two_chambers_stays_open_though_nothing_of_it_was_seen(fill: Fills) -> None:
+    filled = fill(two_chambers())
     assert not np.any(filled.hole[36:44, 58:74] >= 0)
 
 
