@@ -16,28 +16,43 @@ SMOOTH_NS = 500_000_000
 
 
 @dataclass(frozen=True, slots=True)
-class Beam:
-    """A ping with the heading of its moment.
+class Attitude:
+    """What the feeds say of the vehicle at one moment; ``depth_m`` is nan where none does."""
 
-    ``turn_rad`` is its direction, unwrapped along the head's rotation; ``leg`` grows by one where the head turns round;
-    ``profile`` ``(n,)`` is what ``mapping.rest`` compares.
+    heading_rad: float
+    rate_rad_s: float
+    depth_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Beam:
+    """A ping with the attitude of its moment.
+
+    ``number`` counts the beams of a setting; ``turn_rad`` is the direction, unwrapped along the head's rotation;
+    ``leg`` grows by one where the head turns round; ``profile`` ``(n,)`` is what ``mapping.rest`` compares.
     """
 
+    number: int
     ping: Ping
-    heading_rad: float
+    attitude: Attitude
     turn_rad: float
     leg: int
     profile: NDArray[np.float64]
 
+    @property
+    def heading_rad(self) -> float:
+        """Heading at its moment, unwrapped."""
+        return self.attitude.heading_rad
 
-def next_beam(beams: list[Beam], ping: Ping, heading_rad: float, profile: NDArray[np.float64]) -> Beam:
+
+def next_beam(beams: list[Beam], ping: Ping, attitude: Attitude, profile: NDArray[np.float64]) -> Beam:
     """Make the beam that follows those that are there."""
     if not beams:
-        return Beam(ping, heading_rad, heading_rad + ping.bearing_rad, 0, profile)
+        return Beam(0, ping, attitude, attitude.heading_rad + ping.bearing_rad, 0, profile)
     last = beams[-1]
     step = wrap(ping.bearing_rad - last.ping.bearing_rad)
-    turn = last.turn_rad + step + wrap(heading_rad - last.heading_rad)
-    return Beam(ping, heading_rad, turn, last.leg + int(_reverses(beams, step)), profile)
+    turn = last.turn_rad + step + wrap(attitude.heading_rad - last.heading_rad)
+    return Beam(last.number + 1, ping, attitude, turn, last.leg + int(_reverses(beams, step)), profile)
 
 
 def _reverses(beams: list[Beam], step_rad: float) -> bool:
