@@ -19,7 +19,7 @@ from mapping.modes import ELSEWHERE_M, ELSEWHERE_RAD
 from mapping.pieces import LEVEL_M, Pieces, sd_m
 from mapping.prior import Prior
 from mapping.register import Match, register, search
-from mapping.sight import Sight, rise_m
+from mapping.sight import Sight, grounded, rise_m
 from mapping.taper import best_scaled
 from mapping.values import Pose
 from mapping.view import Field, Points, View, field_of, points_of, to_map
@@ -46,7 +46,7 @@ class Charts:
 
     def __init__(self, pieces: Pieces, config: Map) -> None:
         # Not the map's canvas: the map has its own axes, and each would be drawn anew after the other.
-        self._pieces, self._canvas, self._config = pieces, Canvas(config, KEPT), config
+        self._pieces, self._canvas, self._config = pieces, Canvas(grounded(config), KEPT), grounded(config)
         self._last: tuple[tuple[object, ...], View] | None = None
 
     def match(self, sight: Sight, base: int, prior: Prior, rng: np.random.Generator) -> Match:
@@ -113,7 +113,7 @@ class Charts:
         return View(_fewer(points_of(xy[near], trust[near])), self._field(held))
 
     def _field(self, held: Sequence[int]) -> Field:
-        drawn = [self._canvas.cells(self._pieces.pose(k), self._pieces.sight(k).evidence) for k in held]
+        drawn = [self._canvas.cells(self._pieces.pose(k), self._pieces.sight(k).ground) for k in held]
         return field_of(gather(drawn, self._config))
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from config.schema import Map
 from mapping import grid as grids
 from mapping.path import HERE, KNOT_S, THERE, WITNESS, Floats, Marks, bonds_of
-from mapping.sight import Sight
+from mapping.sight import Sight, grounded
 from mapping.values import Pose, Way
 from mapping.view import Field, field_of, from_map, to_map
 from mapping.way import ranges_of
@@ -78,7 +78,7 @@ def course_of(here: Sight, there: Sight, way: Way, config: Map) -> Course:
 
 
 def _field(sight: Sight, config: Map) -> Field:
-    return field_of(grids.render([(Pose(0.0, 0.0, sight.scan.heading_rad), sight.evidence)], config))
+    return field_of(grids.render([(Pose(0.0, 0.0, sight.scan.heading_rad), sight.ground)], grounded(config)))
 
 
 def _at_rest(sight: Sight, state: int, group: int) -> Marks:

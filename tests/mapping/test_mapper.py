@@ -59,6 +59,13 @@ def test_stated_errors_are_honest(keyhole: list[Scan]) -> None:
         assert np.linalg.eigvalsh(station.covariance).min() > 0.0
 
 
+def test_where_stations_are_does_not_hang_on_the_size_of_the_maps_cells(keyhole: list[Scan]) -> None:
+    usual, coarse = mapped(keyhole), mapped(keyhole, Map(cell_m=0.1))
+    assert coarse.grid.cell_m == 0.1
+    assert [station.pose for station in coarse.stations] == [station.pose for station in usual.stations]
+    assert [station.status for station in coarse.stations] == ["placed"] * 3
+
+
 def test_the_same_scans_give_the_same_bytes(keyhole: list[Scan]) -> None:
     one, two = mapped(keyhole), mapped(keyhole)
     assert one.grid.log_odds.tobytes() == two.grid.log_odds.tobytes()
