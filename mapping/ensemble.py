@@ -50,7 +50,7 @@ def mix(grid: Grid, placed: Sequence[Placed], off: Floats) -> Mixture:
     probability = np.zeros(grid.state.shape)
     for each in off:
         moved = [_moved(pose, cells, by, grid) for (pose, cells), by in zip(placed, each, strict=True)]
-        probability += 1.0 / (1.0 + np.exp(-added(moved, grid.state.shape, _corner(grid))))
+        probability += 1.0 / (1.0 + np.exp(-added(moved, grid.state.shape, _corner(grid), grid.cell_m)))
     return Mixture((probability / len(off)).astype(np.float32), _wall_sd_m(grid, placed, off))
 
 

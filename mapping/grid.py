@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter
 
 from config.schema import Map
 from mapping.beam import HINT_LOG_ODDS, PolarEvidence
@@ -16,6 +17,9 @@ from mapping.values import FREE, OCCUPIED, UNKNOWN, Grid, Pose
 CLAMP_OCCUPIED = 4.6
 CLAMP_FREE = -3.5
 """Log-odds are held within these, so that a mistake can be unlearnt."""
+BESIDE_M = 0.1
+MUCH_MORE = 2.5
+"""A wall cell is a hint where so many times its evidence stands within this of it: what is there is the same wall."""
 MARGIN_CELLS = 2
 SAME_M, SAME_RAD = 0.004, math.radians(0.1)
 """A scan is not drawn anew for less."""
@@ -102,20 +106,33 @@ def gather(scans: Sequence[Cells], config: Map) -> Grid:
     south, north = min(int(s.row.min()) for s in told), max(int(s.row.max()) for s in told)
     west, east = min(int(s.col.min()) for s in told), max(int(s.col.max()) for s in told)
     shape = (north - south + 1, east - west + 1)
-    log_odds = added(told, shape, (south, west)).astype(np.float32)
+    log_odds = added(told, shape, (south, west), config.cell_m).astype(np.float32)
     return trim(np.pad(log_odds, MARGIN_CELLS), (south, west), config)
 
 
-def added(scans: Sequence[Cells], shape: tuple[int, ...], corner: tuple[int, int]) -> NDArray[np.float64]:
-    """Add up log-odds, clamped, into ``shape`` rows and columns from ``corner``, the row and column of its first."""
+def added(
+    scans: Sequence[Cells], shape: tuple[int, ...], corner: tuple[int, int], cell_m: float
+) -> NDArray[np.float64]:
+    """Add up log-odds, thinned and clamped, into ``shape`` cells from ``corner``, the row and column of their first."""
     total, hints = np.zeros(shape[0] * shape[1]), np.zeros(shape[0] * shape[1])
     for scan in scans:
         cell = (scan.row - corner[0]) * shape[1] + (scan.col - corner[1])
         hint = (scan.log_odds > 0.0) & (scan.log_odds <= HINT_LOG_ODDS)
         total[cell] += np.where(hint, 0.0, scan.log_odds)
         hints[cell] = np.maximum(hints[cell], np.where(hint, scan.log_odds, 0.0))
-    told = np.where(total >= 0.0, np.maximum(total, hints), total)
-    return np.clip(told, CLAMP_FREE, CLAMP_OCCUPIED).reshape(shape)
+    told = np.where(total >= 0.0, np.maximum(total, hints), total).reshape(shape)
+    return np.clip(thinned(told, cell_m), CLAMP_FREE, CLAMP_OCCUPIED)
+
+
+def thinned(log_odds: NDArray[np.float64], cell_m: float) -> NDArray[np.float64]:
+    """Leave of each wall the place of which most was told; less is a hint where it stands beside much more.
+
+    Scans err by centimetres, and nothing is told open behind a wall: what one of them measured too far would stay.
+    """
+    reach = max(1, round(BESIDE_M / cell_m))
+    long, short = 2 * reach + 1, 2 * reach - 1  # nearly a disc, and quick
+    most = np.maximum(*(maximum_filter(log_odds, size, mode="constant") for size in ((long, short), (short, long))))
+    return np.where((log_odds > HINT_LOG_ODDS) & (MUCH_MORE * log_odds < most), HINT_LOG_ODDS, log_odds)
 
 
 def trim(log_odds: NDArray[np.float32], corner: tuple[int, int], config: Map) -> Grid:

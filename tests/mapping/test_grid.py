@@ -151,6 +151,17 @@ def test_walls_do_not_thicken_with_the_number_of_scans(scans: int, sd_m: float) 
     assert len(walls) * 0.05 < 2.2 * 25.0
 
 
+def test_what_one_scan_measured_too_far_is_no_wall_behind_what_many_saw() -> None:
+    true, far = evidence_of(RECTANGLE), evidence_of(RECTANGLE * 1.02)
+    one, four = (
+        cells(grids.render([(Pose(0.0, 0.0, 0.0), e) for e in [true] * sure + [far]], Map()), OCCUPIED)
+        for sure in (1, 4)
+    )
+    assert (off_walls(one) > 0.06).mean() > 0.1
+    assert (off_walls(four) > 0.06).mean() < 0.01
+    assert len(four) * 0.05 > 0.95 * 25.0
+
+
 def test_hints_do_not_add_up_to_a_wall() -> None:
     vague = evidence_of(RECTANGLE, sd_m=0.2)
     grid = grids.render([(Pose(0.0, 0.0, 0.0), vague)] * 20, Map())
