@@ -17,6 +17,7 @@ from tools.bench import (
     acquisition,
     beams,
     circles,
+    dives,
     fill_large,
     fill_times,
     holes,
@@ -44,6 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--data", type=Path, default=Path("../shared/data"), metavar="DIR", help="real recordings")
     parser.add_argument("--seeds", type=int, default=2, metavar="N", help="emulated dives per site (default: 2)")
     parser.add_argument("--sites", default="keyhole", metavar="LIST", help="truth: emulated sites (default: keyhole)")
+    parser.add_argument("--dives", type=Path, metavar="DIR", help="truth: recorded dives with their truth, instead")
     parser.add_argument("--pilots", default="steady", metavar="LIST", help="truth: how they rest (default: steady)")
     parser.add_argument("--quick", action="store_true", help="acquisition: a short run, for a first look")
     parser.add_argument("--half", choices=("tune", "report"), default="report", help="holes: maps to measure on")
@@ -98,6 +100,9 @@ def _tank(args: argparse.Namespace) -> Iterator[Row]:
 
 
 def _truth(args: argparse.Namespace) -> Iterator[Row]:
+    if args.dives:
+        yield from (asdict(figures) for figures in dives.measure(args.dives))
+        return
     for pilot, seed in product(args.pilots.split(","), range(1, args.seeds + 1)):
         for site in args.sites.split(","):
             yield asdict(truth.measure(site, seed, pilot))

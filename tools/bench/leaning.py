@@ -9,8 +9,8 @@ depth is missing, unless another scan of that level shows it.  Where walls are u
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Final
+from dataclasses import dataclass
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,12 +21,25 @@ from mapping.values import OCCUPIED, Grid
 from tools.bench.align import Alignment
 from tools.bench.walls import Line, distance_to_walls_m, in_view, sampled
 from tools.emulator.echoes import Place
-from tools.emulator.site import Site, Wall
+from tools.emulator.site import Wall
 
 DEPTH_M: Final = 0.05
 """Walls are drawn at depths of so many metres apart."""
 
 Floats = NDArray[np.float64]
+
+
+class Walled(Protocol):
+    """A place of which it is known how its walls stand at each depth."""
+
+    @property
+    def walls(self) -> tuple[Wall, ...]:
+        """Walls at the depth at which they are told."""
+        ...
+
+    def stand(self, walls: tuple[Wall, ...], depth_m: float) -> tuple[Wall, ...]:
+        """Return walls, told at that depth, as they stand at another."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +85,7 @@ def plans_of(grids: Sequence[Grid], placed: Sequence[Sequence[Place]], lost: Seq
 
 
 def judge_walls(
-    site: Site, plans: Sequence[Plan], alignment: Alignment, range_m: float, within_cells: float
+    site: Walled, plans: Sequence[Plan], alignment: Alignment, range_m: float, within_cells: float
 ) -> WallFigures:
     """Judge all plans of a map together; a cell is right no farther than ``within_cells`` from true wall."""
     each = [_judge(site, plan, alignment, range_m, within_cells) for plan in plans]
@@ -80,7 +93,7 @@ def judge_walls(
 
 
 def _judge(
-    site: Site, plan: Plan, alignment: Alignment, range_m: float, within_cells: float
+    site: Walled, plan: Plan, alignment: Alignment, range_m: float, within_cells: float
 ) -> tuple[int, int, int, int]:
     cells_m, within_m = np.zeros((0, 2)), 0.0
     if plan.grid is not None:
@@ -90,8 +103,8 @@ def _judge(
     right = np.zeros(len(cells_m), dtype=bool)
     seen, found = (np.zeros(len(samples.points_m), dtype=bool) for _ in range(2))
     for depth_m, places in _by_depth(plan.places).items():
-        lines = _lines(site.plan_at(depth_m))
-        (points_m,) = (wall.points_m for wall in replace(site, walls=(samples,)).plan_at(depth_m))
+        lines = _lines(site.stand(site.walls, depth_m))
+        (points_m,) = (wall.points_m for wall in site.stand((samples,), depth_m))
         right |= distance_to_walls_m(cells_m, lines) <= within_m
         here = np.any([in_view(points_m, lines, np.array([p.x_m, p.y_m]), range_m) for p in places], axis=0)
         seen |= here

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import nan
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +16,11 @@ from daemon.state import MapState
 from drivers.records import Chunk, Record
 from mapping.values import Station
 from tools.bench.align import Alignment, align, angle_between
-from tools.bench.leaning import WallFigures, judge_walls, plans_of
+from tools.bench.leaning import Walled, WallFigures, judge_walls, plans_of
 from tools.emulator.dive import Dive, DiveOptions
+from tools.emulator.echoes import Place
 from tools.emulator.record import record
-from tools.emulator.site import SITES
+from tools.emulator.site import SITES, Stop
 from tools.emulator.vehicle import PILOTS, Rest
 
 WITHIN_CELLS: Final = 1.5
@@ -28,6 +29,9 @@ WITHIN_CELLS: Final = 1.5
 WRONG_M: Final = 0.5
 """A placed station farther than this from where it was is wrong, and confident."""
 
+WITHIN_REST: Final = 0.7
+"""A scan is of a rest when this share of its time was in it: circles begin while a vehicle still glides in."""
+
 PASSAGES: Final = ("gallery", "loop", "tunnel")
 """Sites that have an axis."""
 
@@ -35,6 +39,43 @@ IN_95: Final = 5.99
 """Square of the distance, in standard deviations, within which 95 % of a normal in the plane lie."""
 
 Floats = NDArray[np.float64]
+
+
+class Surveyed(Walled, Protocol):
+    """A place with the stops of a dive."""
+
+    @property
+    def name(self) -> str:
+        """What the place is called."""
+        ...
+
+    @property
+    def stops(self) -> tuple[Stop, ...]:
+        """Where the vehicle rests, in order."""
+        ...
+
+
+class Known(Protocol):
+    """A dive of which it is known where the vehicle truly was."""
+
+    @property
+    def site(self) -> Surveyed:
+        """Where the dive was."""
+        ...
+
+    @property
+    def seed(self) -> int:
+        """What chance it was made by."""
+        ...
+
+    @property
+    def rests(self) -> list[Rest]:
+        """The rests so far, in order."""
+        ...
+
+    def place_during(self, rest: Rest) -> Place:
+        """Return where the vehicle was at a rest, on average."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,12 +168,12 @@ def measure(site: str, seed: int, pilot: str = "steady", stations: int | None = 
     for each in dive_records(dive):
         pipeline.push(each)
     pipeline.finish()
-    return judge(dive, pipeline.state, config, pilot)
+    return judge(dive, pipeline.whole, config, pilot)
 
 
-def judge(dive: Dive, state: MapState, config: Config, pilot: str = "steady") -> TruthFigures:
+def judge(dive: Known, state: MapState, config: Config, pilot: str = "steady") -> TruthFigures:
     """Hold the map of a dive against where the vehicle and the walls truly were."""
-    rests = dive.vehicle.rests
+    rests = dive.rests
     placed = [station for station in state.stations if station.status == "placed"]
     pairs = [(station, rest) for station in placed if (rest := _rest_of(station, rests)) is not None]
     errors, alignment = errors_of(dive, pairs)
@@ -162,7 +203,7 @@ def judge(dive: Dive, state: MapState, config: Config, pilot: str = "steady") ->
     )
 
 
-def _in_passage(dive: Dive, errors_m: Floats) -> float:
+def _in_passage(dive: Known, errors_m: Floats) -> float:
     return round(float(errors_m.max()), 4) if dive.site.name in PASSAGES else nan
 
 
@@ -173,7 +214,7 @@ def closure_m(errors: Errors, rests: list[int], count: int) -> float:
     return float(np.linalg.norm(errors.fitted_m[rests.index(count - 1)] - errors.fitted_m[rests.index(0)]))
 
 
-def errors_of(dive: Dive, pairs: list[tuple[Station, Rest]]) -> tuple[Errors, Alignment]:
+def errors_of(dive: Known, pairs: list[tuple[Station, Rest]]) -> tuple[Errors, Alignment]:
     """Hold placed stations against where the vehicle was on average at their rests."""
     places = [dive.place_during(rest) for _, rest in pairs]
     found_m = np.array([[station.pose.x_m, station.pose.y_m] for station, _ in pairs])
@@ -187,7 +228,7 @@ def errors_of(dive: Dive, pairs: list[tuple[Station, Rest]]) -> tuple[Errors, Al
     return Errors(fitted_m, fitted_m - fitted_m[0], headings_rad, covariance, _courses(dive, pairs)), alignment
 
 
-def _courses(dive: Dive, pairs: list[tuple[Station, Rest]]) -> Floats:
+def _courses(dive: Known, pairs: list[tuple[Station, Rest]]) -> Floats:
     """Direction ``(n, 2)`` from the stop before each rest to the one after it."""
     stops = dive.site.stops
     ends = [(stops[max(rest.index - 1, 0)], stops[min(rest.index + 1, len(stops) - 1)]) for _, rest in pairs]
@@ -199,13 +240,13 @@ def _rest_of(station: Station, rests: list[Rest]) -> Rest | None:
     scan = station.scan
     for rest in rests:
         during = min(scan.t_end_ns, rest.to_ns or scan.t_end_ns) - max(scan.t_start_ns, rest.from_ns)
-        if during > 0.8 * (scan.t_end_ns - scan.t_start_ns):
+        if during > WITHIN_REST * (scan.t_end_ns - scan.t_start_ns):
             return rest
     return None
 
 
 def _walls(
-    dive: Dive, state: MapState, pairs: list[tuple[Station, Rest]], map_: tuple[Alignment, float]
+    dive: Known, state: MapState, pairs: list[tuple[Station, Rest]], map_: tuple[Alignment, float]
 ) -> WallFigures:
     """Judge the walls of all levels; ``map_`` is the map's alignment and the sonar's range in m."""
     grids = [state.grid, *(level.grid for level in state.levels)]
@@ -216,5 +257,5 @@ def _walls(
         for n in range(len(grids))
     ]
     placed = {rest.index for _, rest in pairs}
-    lost = [dive.place_during(rest) for rest in dive.vehicle.rests if rest.index not in placed]
+    lost = [dive.place_during(rest) for rest in dive.rests if rest.index not in placed]
     return judge_walls(dive.site, plans_of(grids, at, lost), *map_, WITHIN_CELLS)

@@ -82,6 +82,11 @@ class Dive:
         """Whether the last stop's rest was long enough."""
         return self.vehicle.done
 
+    @property
+    def rests(self) -> list[Rest]:
+        """The rests so far, in order."""
+        return self.vehicle.rests
+
     def place_during(self, rest: Rest) -> Place:
         """Return where the vehicle truly was at a rest, on average; the stop itself where nothing is known yet."""
         until_ns = rest.to_ns if rest.to_ns is not None else rest.from_ns

@@ -76,6 +76,10 @@ class Site:
 
     def plan_at(self, depth_m: float) -> tuple[Wall, ...]:
         """Return the walls as they stand at a depth."""
+        return self.stand(self.walls, depth_m)
+
+    def stand(self, walls: tuple[Wall, ...], depth_m: float) -> tuple[Wall, ...]:
+        """Return walls of ``plan_depth_m`` as they stand at a depth."""
         scale = 1.0 + self.taper_per_m * (depth_m - self.plan_depth_m)
         centre = np.array(self.centre_m)
-        return tuple(Wall(centre + scale * (wall.points_m - centre), wall.closed) for wall in self.walls)
+        return tuple(Wall(centre + scale * (wall.points_m - centre), wall.closed) for wall in walls)
