@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from config.schema import Map
 from mapping import grid as grids
-from mapping.path import HERE, KNOT_S, THERE, WITNESS, Floats, Marks, bonds_of
+from mapping.grain import Grain, grain_of, levels
+from mapping.path import HERE, KNOT_S, THERE, WITNESS, Floats, Ints, Marks, bonds_of
 from mapping.sight import Sight, grounded
 from mapping.values import Pose, Way
-from mapping.view import Field, field_of, from_map, to_map
+from mapping.view import TRUSTED_SD_M, VAGUE_SD_M, Field, field_of, from_map, to_map
 from mapping.way import ranges_of
 
 MOST_KNOTS = 64
@@ -38,7 +39,7 @@ THROUGH = 2.0
 class Course:
     """A way cut into ``knots``, ``seconds`` long, with the marks of both rests and of the way between them.
 
-    ``here`` and ``there`` are the fields of the two rests, in axes of the compass.
+    ``here`` and ``there`` are the fields of the two rests, in the compass's axes; ``grain`` is how loud walls answered.
     """
 
     here: Field
@@ -46,6 +47,7 @@ class Course:
     marks: Marks
     seconds: float
     knots: int
+    grain: Grain | None
 
     def when(self) -> Floats:
         """Give the moment of each mark ``(n,)``, 0 at the first rest and 1 at the second."""
@@ -74,7 +76,37 @@ def course_of(here: Sight, there: Sight, way: Way, config: Map) -> Course:
         np.concatenate([*(p.share for p in parts), at - state]),
         np.concatenate([*(p.group for p in parts), (turned / math.pi).astype(np.intp) + 1]),
     )
-    return Course(_field(here, config), _field(there, config), marks, seconds, knots)
+    grain = _grain(here, there, way, marks, (range_m[heard], heard))
+    return Course(_field(here, config), _field(there, config), marks, seconds, knots, grain)
+
+
+def _grain(here: Sight, there: Sight, way: Way, marks: Marks, under_way: tuple[Floats, Ints]) -> Grain | None:
+    """Gather how loud walls answered: at both rests every clear return, and under way those that are marks."""
+    range_m, beams = under_way
+    moving = marks.group > HERE
+    parts = [_looks(here, 0, HERE), _looks(there, int(marks.state.max()), THERE)]
+    looks = Marks(
+        np.concatenate([*(look.arm_m for look, _ in parts), marks.arm_m[moving]]),
+        np.concatenate([*(look.trust for look, _ in parts), marks.trust[moving]]),
+        np.concatenate([*(look.normal_rad for look, _ in parts), marks.normal_rad[moving]]),
+        np.concatenate([*(look.state for look, _ in parts), marks.state[moving]]),
+        np.concatenate([*(look.share for look, _ in parts), marks.share[moving]]),
+        np.concatenate([*(look.group for look, _ in parts), marks.group[moving]]),
+    )
+    level = np.concatenate([*(level for _, level in parts), levels(way.echoes[beams], range_m, way.bin_m)])
+    return grain_of(looks, level)
+
+
+def _looks(sight: Sight, state: int, group: int) -> tuple[Marks, Floats]:
+    """Give the returns of a rest, in axes of the compass, and their levels."""
+    returns, scan = sight.returns, sight.scan
+    clear = np.flatnonzero(np.isfinite(returns.range_m) & (np.nan_to_num(returns.sd_m, nan=1.0) < VAGUE_SD_M))
+    range_m, direction = returns.range_m[clear], scan.heading_rad + scan.bearing_rad[clear]
+    n = len(clear)
+    arm = np.stack([range_m * np.sin(direction), range_m * np.cos(direction)], axis=1)
+    trust = np.minimum(1.0, TRUSTED_SD_M / np.maximum(returns.sd_m[clear], 1e-6))
+    looks = Marks(arm, trust, np.full(n, np.nan), np.full(n, state), np.zeros(n), np.full(n, group))
+    return looks, levels(scan.echoes[clear], range_m, scan.bin_m)
 
 
 def _field(sight: Sight, config: Map) -> Field:

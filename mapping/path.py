@@ -8,6 +8,7 @@ vehicle begins and ends at rest, and nothing is known of its thrust: acceleratio
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -118,12 +119,12 @@ def bonds_of(marks: Marks, places: Floats, within_m: float) -> Bonds:
     """Bind each mark to the nearest one of every group that saw the same wall at another time."""
     ones, others = [np.zeros(0, np.intp)], [np.zeros(0, np.intp)]
     for group in range(THERE, int(marks.group.max(initial=0)) + 1):
-        of, later = np.flatnonzero(marks.group == group), np.flatnonzero(_later(marks.group, group))
-        if not len(of) or not len(later):
+        of, after = np.flatnonzero(marks.group == group), np.flatnonzero(later(marks.group, group))
+        if not len(of) or not len(after):
             continue
-        distance, near = cKDTree(places[of]).query(places[later], distance_upper_bound=within_m)
+        distance, near = cKDTree(places[of]).query(places[after], distance_upper_bound=within_m)
         heard = np.flatnonzero(np.isfinite(distance))
-        ones.append(later[heard])
+        ones.append(after[heard])
         others.append(of[np.asarray(near, dtype=np.intp)[heard]])
     one: Ints = np.concatenate(ones)
     other: Ints = np.concatenate(others)
@@ -142,7 +143,7 @@ def _cosine(arm_m: Floats, normal: Floats) -> Floats:
     return np.asarray(along / np.maximum(np.hypot(arm_m[:, 0], arm_m[:, 1]), 1e-6), dtype=np.float64)
 
 
-def _later(group: Ints, than: int) -> NDArray[np.bool_]:
+def later(group: Ints, than: int) -> NDArray[np.bool_]:
     """Tell what is bound to a group: all the way and the other rest to the rests, and to a go those after the next.
 
     Half a turn later the beams look elsewhere, and where they still meet the marks before, they are of one go.
@@ -154,7 +155,13 @@ def _later(group: Ints, than: int) -> NDArray[np.bool_]:
     return np.asarray(group > than + 1)
 
 
-def improve(path: Floats, marks: Marks, prior: Floats, within_m: float, rounds: int) -> tuple[Floats, Floats]:
+Pull = Callable[[Floats], tuple[Floats, Floats]]
+"""Along a path ``(states, 3)``: what else is told of it, as information ``(3 states, 3 states)`` and its vector."""
+
+
+def improve(
+    path: Floats, marks: Marks, prior: Floats, within_m: float, rounds: int, pull: Pull | None = None
+) -> tuple[Floats, Floats]:
     """Make steps of Gauss and Newton; give the path ``(states, 3)`` and the information ``(3 states, 3 states)``."""
     information = prior
     for _ in range(rounds):
@@ -162,16 +169,19 @@ def improve(path: Floats, marks: Marks, prior: Floats, within_m: float, rounds: 
         bonds = bonds_of(marks, places, within_m)
         trust = marks.trust[bonds.one] * marks.trust[bonds.other]
         weight = WITNESS * trust / (SIGMA_M**2 * (1.0 + (bonds.off_m / ROBUST_M) ** 2))
-        rows = _derived(marks, arms, bonds, len(path))
+        rows = derived(marks, arms, bonds, len(path))
         information = prior + (rows * weight[:, None]).T @ rows
         right = prior @ path.ravel() + rows.T @ (weight * bonds.off_m)
+        if pull is not None:
+            more, by = pull(path)
+            information, right = information + more, right + by
         step = np.zeros(path.size)
         step[3:] = np.linalg.solve(information[3:, 3:], right[3:])  # the first rest is the origin
         path = path - step.reshape(path.shape)
     return path, information
 
 
-def _derived(marks: Marks, arms: Floats, bonds: Bonds, states: int) -> Floats:
+def derived(marks: Marks, arms: Floats, bonds: Bonds, states: int) -> Floats:
     """Derive how far bonds are off by the states, ``(m, 3 states)``: a turn clockwise moves (x, y) by (y, -x)."""
     count = len(bonds.one)
     rows = np.zeros((count, states, 3))

@@ -12,7 +12,15 @@ from mapping.echoes import pick
 from mapping.path import HERE, THERE, improve, inertia
 from mapping.prior import Cloud
 from mapping.sight import Sight, sight_of
-from mapping.traverse import is_alone, sobered, traverse
+from mapping.traverse import (
+    HEARD_TEMPER,
+    HEARD_WIDEN,
+    Settled,
+    is_alone,
+    joined,
+    sobered,
+    traverse,
+)
 from mapping.values import Way
 from tests.mapping.rooms import KEYHOLE, TUNNEL, Stay, pings
 from tests.mapping.test_scan_builder import build
@@ -24,6 +32,12 @@ def two_sights(walls: np.ndarray, there: Stay) -> tuple[Sight, Sight]:
     scans = build(list(pings(walls, [START, there], np.random.default_rng(3))))
     first, second = (sight_of(scan, pick(scan, Map()), Map()) for scan in scans)
     return first, second
+
+
+def settled_at(x_m: float, y_m: float, height: float) -> Settled:
+    path = np.zeros((6, 3))
+    path[-1, :2] = x_m, y_m
+    return Settled(path, np.diag([0.02**2, 0.005**2]), height)
 
 
 def gone(pair: tuple[Sight, Sight]) -> Cloud:
@@ -130,7 +144,18 @@ def test_what_smooth_walls_seem_to_tell_along_them_is_taken_off() -> None:
 
 
 def test_paths_that_end_near_the_best_one_are_no_rivals() -> None:
-    ends = np.array([[0.0, 0.0], [0.1, 0.2], [1.0, 0.0]])
-    assert is_alone(ends, np.array([100.0, 99.0, 40.0]))
-    assert not is_alone(ends, np.array([100.0, 99.0, 80.0]))
-    assert is_alone(ends[:1], np.array([3.0]))
+    best, near, far = (settled_at(*at) for at in ((0.0, 0.0, 100.0), (0.1, 0.2, 99.0), (1.0, 0.0, 40.0)))
+    assert is_alone([best, near, far])
+    assert not is_alone([best, near, replace(far, height=80.0)])
+    assert is_alone([far])
+
+
+def test_of_paths_that_fit_alike_the_one_along_which_walls_sound_alike_is_believed() -> None:
+    short, right = (
+        replace(settled_at(x, 0.0, height), like=like) for x, height, like in ((0.1, 110.0, 3.0), (2.4, 100.0, 19.0))
+    )
+    cloud = joined([short, right], HEARD_TEMPER, HEARD_WIDEN)
+    assert cloud.x_m == pytest.approx(2.4, abs=0.01)
+    assert cloud.sd_m < 0.1
+    chance = joined([short, replace(right, like=4.0)], HEARD_TEMPER, HEARD_WIDEN)
+    assert chance.sd_m > 0.5, "what sounds alike by chance tells nothing"
