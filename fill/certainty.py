@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fill.logistic import Logistic, sigmoid
-from fill.trees import Trees
 from fill.witness import CELL_FEATURES, HOLE_FEATURES
+from mapping.trees import Trees
 
 LOWEST: Final = 0.02
 HIGHEST: Final = 0.995

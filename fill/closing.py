@@ -16,7 +16,7 @@ from fill.freedom import capped
 from fill.matching import asked, assign, candidates, gain
 from fill.memory import Memory
 from fill.segments import EIGHT, End, Walls
-from fill.trees import Trees
+from mapping.trees import Trees
 from mapping.values import OCCUPIED, UNKNOWN
 
 THRESHOLD: Final = 0.3

@@ -8,6 +8,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from mapping.trees import sigmoid as sigmoid
+
 _STEPS: Final = 8
 
 
@@ -35,8 +37,3 @@ class Logistic:
             curvature = self.precision + (features * (count * chance * (1.0 - chance))[:, None]).T @ features
             weights = weights + np.linalg.solve(curvature, slope)
         return Logistic(weights, curvature)
-
-
-def sigmoid(x: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Logistic function, safe for any size of ``x``."""
-    return 0.5 * (1.0 + np.tanh(0.5 * x))

@@ -11,7 +11,7 @@ from fill import prior_cells, prior_holes
 from fill.candidates import FEATURES
 from fill.certainty import DESIGN, Belief, Learnt
 from fill.logistic import Logistic
-from fill.trees import planted
+from mapping.trees import planted
 
 _SITE: Final = (0.0, 1.0)
 """Level and slope of the log-odds of cells that a site begins with: as they were learnt, on places left out."""

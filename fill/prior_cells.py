@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from fill.trees import Table
+from mapping.trees import Table
 
 LONGEST: Final = 3.7257
 """Logarithm of the longest gap that was learnt on, in cells."""

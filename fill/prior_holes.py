@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from fill.trees import Table
+from mapping.trees import Table
 
 TREES: Final = Table(
     """one | log gap | short | bend | lesser bend | turn | offset | lesser offset | half | uneven | kink

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import islice
 from typing import Protocol
 
@@ -18,7 +17,8 @@ from mapping.likelihood import Likelihood, Posterior
 from mapping.modes import ELSEWHERE_M, ELSEWHERE_RAD
 from mapping.pieces import LEVEL_M, Pieces, sd_m
 from mapping.prior import Prior
-from mapping.register import Match, register, search
+from mapping.register import Match, challenged, register
+from mapping.search import search
 from mapping.sight import Sight, grounded, rise_m
 from mapping.taper import best_scaled
 from mapping.values import Pose
@@ -35,8 +35,6 @@ SURE_M = 0.3
 SAME_LEVEL_M = 0.2
 """Where none is of a scan's level, those are that are within this of the nearest level."""
 LEAST_PARTICLES = 200
-HOPELESS = 1.0
-"""A match of a smaller margin is not believed, and nobody else need be heard."""
 
 Floats = NDArray[np.float64]
 
@@ -54,15 +52,8 @@ class Charts:
         held = self.about(base, (prior.x_m, prior.y_m), sight)
         reference = self.reference(held, prior, sight)
         if rise_m(sight.scan, self._pieces.sight(held[0]).scan) <= LEVEL_M:
-            match = register(sight.view, reference, prior, self._config.particles * prior.effort, rng)
-            if held == [base] or match.margin < HOPELESS:
-                return match
-            alone = self.alone(sight, base, prior)
-            pose = np.array([[match.pose.x_m, match.pose.y_m, match.pose.heading_rad]])
-            match = replace(match, alone=float(alone.score(pose)[0]))
-            best, _ = search(alone, prior, self._config.particles // 2 * prior.effort, rng, np.zeros((0, 3)))
-            margin = doubted(match, best, Likelihood(sight.view, reference, prior), alone)
-            return replace(match, margin=min(match.margin, margin))
+            alone = None if held == [base] else self.alone(sight, base, prior)
+            return register(sight.view, reference, prior, self._config.particles * prior.effort, rng, alone)
         rise = min(rise_m(sight.scan, self._pieces.sight(k).scan) for k in held)
         particles = max(LEAST_PARTICLES, self._config.particles // 3) * prior.effort
 
@@ -161,7 +152,7 @@ def best_of(matches: list[Match]) -> Match:
     best = max(matches, key=lambda m: m.height)
     poses = [(m.pose, m.height) for m in matches] + [(m.other, m.height - m.margin) for m in matches]
     far = [height for pose, height in poses if apart_m(pose, best.pose) > ELSEWHERE_M]
-    return replace(best, margin=best.height - max(far, default=-math.inf))
+    return challenged(best, max(far, default=-math.inf))
 
 
 def apart_m(a: Pose, b: Pose) -> float:

@@ -20,7 +20,8 @@ from mapping.likelihood import SIGMA_M, Likelihood
 from mapping.modes import local_moments, pose_of
 from mapping.pieces import Pieces, sd_m
 from mapping.prior import Prior
-from mapping.register import overlap, search
+from mapping.search import search
+from mapping.signs import overlap
 from mapping.values import Pose
 from mapping.view import View
 

@@ -14,6 +14,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from mapping.field import KNOWN_M
 from mapping.prior import Prior
 from mapping.values import Pose
 from mapping.view import LEVEL_M, LEVELS, View
@@ -29,6 +30,8 @@ IN_WATER, WATER_M = (-1.2, -4.5), 0.1
 """What it says in open water, from so far from walls ..."""
 FAR_WATER, FAR_M = (-0.35, 1.16), 0.45
 """... and what farther out is added: it may be a ghost."""
+WET_M = 0.25
+"""From so far from walls, what is seen as open water is no wall's edge."""
 FULL = 100.0
 """Points of a full scan; more of them err together and say no more."""
 WIDE_M, FEWER = 0.15, 2
@@ -71,6 +74,20 @@ class Likelihood:
         told = self._forth.sums(*_outward(seen), sigma_m) + self._back.sums(*_inward(seen), sigma_m)
         return told.astype(np.float64)
 
+    def signs(self, poses: Floats) -> tuple[Floats, Floats, Floats]:
+        """Tell of poses ``(n, 3)`` what the score is made of.
+
+        The first ``(n, 10)`` are what lies on rough walls and on plain ones, beside walls, in open water and far out in
+        it, of rough points and then of plain ones; the second ``(n, 6)`` the shares of the scan's points, and of the
+        reference's, that lie where anything is known, on walls, and in open water; the third ``(n, 2)`` the scores of
+        the scan's points and of the reference's.
+        """
+        seen = poses if self._at is None else _seen_from(self._at, poses)
+        forth, back = self._forth.signs(*_outward(seen)), self._back.signs(*_inward(seen))
+        ways = np.stack([self._forth.sums(*_outward(seen), SIGMA_M), self._back.sums(*_inward(seen), SIGMA_M)], axis=1)
+        shares = np.concatenate([forth[1], back[1]], axis=1)
+        return self.witnesses * (forth[0] + back[0]), shares, self.witnesses * ways.astype(np.float64)
+
 
 class _Side:
     """One side's points, rough ones first, looked up in what the other side saw."""
@@ -93,13 +110,28 @@ class _Side:
         if step not in self._spread:
             self._spread[step] = self._every(step)
         xy1, weight, n = self._spread[step]
+        cell = self._cells(to_x, to_y, xy1)
+        told = rough.take(cell[:, :n]) @ weight[:n] + plain.take(cell[:, n:]) @ weight[n:]
+        return np.asarray(told, dtype=np.float32)
+
+    def signs(self, to_x: Floats, to_y: Floats) -> tuple[Floats, Floats]:
+        """Tell what the sums are made of, ``(n, 10)``, and the shares of points ``(n, 3)``; see the posterior's."""
+        xy1, weight, n = self._spread[1]
+        codes = self._codes.take(self._cells(to_x, to_y, xy1))
+        rough, plain = (
+            SIGNS.take(part, axis=1) @ told for part, told in ((codes[:, :n], weight[:n]), (codes[:, n:], weight[n:]))
+        )
+        known = (KNOWN.take(codes, axis=1) @ weight) / max(float(weight.sum()), 1e-9)
+        return np.concatenate([rough, plain]).T.astype(np.float64), known.T.astype(np.float64)
+
+    def _cells(self, to_x: Floats, to_y: Floats, xy1: Singles) -> NDArray[np.int32]:
+        """Give the cells of the points, ``(n, points)``."""
         rows, cols = self._shape
         x, y = (self._in_cells(to, axis) @ xy1 for axis, to in enumerate((to_x, to_y)))
         cell = np.clip(y, 0, rows - 1, out=y).astype(np.int32)
         cell *= np.int32(cols)
         cell += np.clip(x, 0, cols - 1, out=x).astype(np.int32)
-        told = rough.take(cell[:, :n]) @ weight[:n] + plain.take(cell[:, n:]) @ weight[n:]
-        return np.asarray(told, dtype=np.float32)
+        return cell
 
     def _every(self, step: int) -> tuple[Singles, Singles, int]:
         """Take every so many of the points, each then speaking for as many: places, weights, how many are rough."""
@@ -127,6 +159,19 @@ def said(kind: int, sigma_m: float) -> Singles:
             at = (2 * rough + free) * LEVELS
             table[at : at + LEVELS] = ON_WALL[kind][1 - rough] * on + BESIDE[kind] * beside + water
     return table
+
+
+def _tables() -> tuple[Singles, Singles]:
+    """Make what codes mean: ``(5, 256)`` for what a score is made of, and ``(3, 256)`` for shares."""
+    code = np.arange(256)
+    distance_m, free, rough = code % LEVELS * LEVEL_M, code // LEVELS % 2 == 1, code // LEVELS >= 2
+    on, beside, dry = (np.exp(-0.5 * (distance_m / width_m) ** 2) for width_m in (SIGMA_M, BESIDE_M, WATER_M))
+    made_of = np.stack([on * rough, on * ~rough, beside, free * (1.0 - dry), free & (distance_m > FAR_M)])
+    shares = np.stack([free | (distance_m < KNOWN_M), distance_m < 2.0 * SIGMA_M, free & (distance_m > WET_M)])
+    return made_of.astype(np.float32), shares.astype(np.float32)
+
+
+SIGNS, KNOWN = _tables()
 
 
 def _seen_from(at: Pose, poses: Floats) -> Floats:

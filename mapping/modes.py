@@ -38,6 +38,33 @@ class Ridge:
     covariance: Floats
 
 
+@dataclass(frozen=True, slots=True)
+class Mode:
+    """A place where a posterior is high: its best ``pose`` ``(3,)``, log-posterior, mean and covariance."""
+
+    pose: Floats
+    height: float
+    mean: Floats
+    covariance: Floats
+
+    @property
+    def sd_m(self) -> float:
+        """Largest standard deviation of the place in any direction."""
+        return math.sqrt(float(np.linalg.eigvalsh(self.covariance[:2, :2])[-1]))
+
+
+def mode_at(like: Posterior, pose: Floats) -> Mode:
+    """Tell of a mode whose best pose is known."""
+    mean, covariance = local_moments(like, pose)
+    return Mode(pose, float(like.log_posterior(pose[None, :])[0]), mean, covariance)
+
+
+def is_elsewhere(one: Floats, other: Floats) -> bool:
+    """Tell whether two poses ``(3,)`` are two answers."""
+    turned = (float(one[2] - other[2]) + math.pi) % (2.0 * math.pi) - math.pi
+    return math.hypot(*(one - other)[:2]) >= ELSEWHERE_M or abs(turned) >= ELSEWHERE_RAD
+
+
 def pose_of(state: Floats) -> Pose:
     """Make a pose of x_m, y_m, heading_rad ``(3,)``."""
     return Pose(float(state[0]), float(state[1]), float(state[2]) % (2.0 * math.pi))

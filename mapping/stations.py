@@ -23,6 +23,7 @@ from mapping.led import along, led
 from mapping.levels import levels_of
 from mapping.pieces import Pieces
 from mapping.prior import Hint, Prior, agreed
+from mapping.register import challenged
 from mapping.repeats import Repeats
 from mapping.sight import Sight
 from mapping.strides import Strides
@@ -174,7 +175,7 @@ class Stations:
             if rival > match.height:
                 match, prior = self._charts.match(sight, base, anyhow, rng), anyhow
             else:
-                match = replace(match, margin=min(match.margin, match.height - rival))
+                match = challenged(match, rival)
         piece = 0 if base in self._map else self._sights[base].scan.index + 1
         return judge(sight.scan, match, piece, prior, chained=abs(base - i) == 1)
 

@@ -14,7 +14,7 @@ from mapping.odometry import REST_SD_M, UNSEEN_M_S, Odometer
 from mapping.prior import Cloud, Hint, Prior
 from mapping.register import Match
 from mapping.values import Displacement, Pose
-from mapping.verdict import SEEN, judge, log_odds
+from mapping.verdict import SEEN, judge
 from tests.mapping.rooms import TUNNEL
 from tests.mapping.test_echoes import scan_of
 
@@ -86,8 +86,8 @@ def test_ways_are_joined_and_turned_into_the_map() -> None:
 
 
 MATCH = Match(
-    pose=Pose(1.8, 0.3, 1.0), covariance=np.diag([0.04, 0.0004, 0.001]), margin=9.0, overlap=0.6, weak_rad=math.pi / 2,
-    hold=0.02, height=1.0, fit=0.7, alone=0.7, behind=0.0, other=Pose(0, 0, 0), astray=1.0, ridge=False,
+    pose=Pose(1.8, 0.3, 1.0), covariance=np.diag([0.04, 0.0004, 0.001]), margin=9.0, odds=1.1, overlap=0.6,
+    weak_rad=math.pi / 2, hold=0.02, height=1.0, fit=0.7, other=Pose(0, 0, 0), astray=1.0, ridge=False,
 )  # fmt: skip
 PRIOR = Prior(2.4, 0.0, 0.12, 1.0, 0.07, gaussian=True)
 
@@ -134,7 +134,7 @@ def test_a_scan_is_put_between_its_walls_and_its_way_along_the_way_only() -> Non
 
 def test_where_walls_do_not_tell_a_scan_is_placed_as_surely_as_its_way_was_seen() -> None:
     scan, here = scan_of(TUNNEL), Prior(0.0, 0.0, 3.0, 1.0, 0.07)
-    assert log_odds(MATCH) < SEEN
+    assert MATCH.odds < SEEN
     assert judge(scan, MATCH, 0, here, chained=True).status != "placed"
     seen = judge(scan, MATCH, 0, replace(here, cloud=cloud_of(0.5)), chained=True)
     assert (seen.status, seen.piece) == ("placed", 0)

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -12,11 +13,13 @@ from numpy.typing import NDArray
 from config.schema import Map
 from mapping.graph import put_at
 from mapping.likelihood import PLAIN, ROUGH, Likelihood, said
+from mapping.modes import Mode, is_elsewhere, mode_at
 from mapping.prior import Prior
-from mapping.register import Match, behind, register
+from mapping.register import MODES, Match, challenged, modes_of, register
 from mapping.sight import Sight, sight_of
+from mapping.signs import MOST, SIGNS, behind, odds_of, signs_of
 from mapping.values import Pose, Returns, Scan
-from mapping.verdict import judge, log_odds
+from mapping.verdict import ACCEPT, judge
 from mapping.view import LEVEL_M, LEVELS
 from tests.mapping.rooms import KEYHOLE, RECTANGLE, STEP_RAD, TUNNEL, cast
 
@@ -120,13 +123,47 @@ def test_what_a_point_says_falls_off_from_the_wall_into_the_water(kind: int, sig
     assert wet[0] > 0.0 > wet[int(0.4 / LEVEL_M)] or kind == ROUGH
 
 
-def test_a_match_is_likelier_right_with_more_margin_and_less_width() -> None:
+def test_the_right_place_is_likelier_right_than_any_other() -> None:
+    scan, reference = seen(KEYHOLE, 0.3, 0.2, 0.1, seed=2), seen(KEYHOLE, 0.0, 0.0, 0.0)
+    prior = Prior(0.0, 0.0, 3.0, 0.1, math.radians(4.0))
+    like = Likelihood(scan.view, reference.view, prior)
+    modes = modes_of(like, prior, 600, np.random.default_rng(4))
+    assert len(modes) == MODES
+    assert [mode.height for mode in modes] == sorted((mode.height for mode in modes), reverse=True)
+    assert all(is_elsewhere(one.pose, other.pose) for one, other in itertools.combinations(modes, 2))
+    odds = odds_of(signs_of(scan.view, reference.view, like, prior, modes, None))
+    right = [math.hypot(mode.pose[0] - 0.3, mode.pose[1] - 0.2) < 0.1 for mode in modes]
+    assert right.count(True) == 1
+    assert odds[right.index(True)] > max(ACCEPT, odds[np.logical_not(right)].max() + 4.0)
+
+
+def test_signs_of_a_mode_are_its_own_and_against_the_best_one_elsewhere() -> None:
+    scan, reference = seen(KEYHOLE, 0.3, 0.2, 0.1, seed=2), seen(KEYHOLE, 0.0, 0.0, 0.0)
+    prior = Prior(0.0, 0.0, 3.0, 0.1, math.radians(4.0))
+    like = Likelihood(scan.view, reference.view, prior)
+    modes = [mode_at(like, np.array([x_m, 0.2, 0.1])) for x_m in (0.3, 1.5, 2.5)]
+    modes.sort(key=lambda mode: -mode.height)
+    signs = signs_of(scan.view, reference.view, like, prior, modes, None)
+    told = dict(zip(SIGNS, signs.T, strict=True))
+    assert signs.shape == (3, len(SIGNS))
+    assert told["lead"] == pytest.approx([min(each, MOST) for each in leads(modes)])
+    assert told["forth"] + told["back"] == pytest.approx(like.witnesses * told["fit"], rel=1e-4)
+    ahead = told["plain on plain"][0] - told["plain on plain"][1]
+    assert told["plain on plain, lead"][:2] == pytest.approx([ahead, -ahead])
+    lone = signs_of(scan.view, reference.view, like, prior, modes[:1], None)[0]
+    assert lone[SIGNS.index("lead")] == MOST
+
+
+def leads(modes: list[Mode]) -> list[float]:
+    heights = [mode.height for mode in modes]
+    return [heights[0] - heights[1], heights[1] - heights[0], heights[2] - heights[0]]
+
+
+def test_a_match_is_less_sure_where_another_prior_finds_as_good_a_place() -> None:
     match = matched(seen(KEYHOLE, 0.3, 0.2, 0.1, seed=2), seen(KEYHOLE, 0.0, 0.0, 0.0))
-    assert log_odds(match) > 2.2
-    assert log_odds(replace(match, margin=1.0)) < log_odds(match)
-    assert log_odds(replace(match, covariance=100.0 * match.covariance)) < log_odds(match)
-    assert log_odds(replace(match, alone=0.1)) < log_odds(match), "the scan before does not bear it out"
-    assert log_odds(replace(match, behind=0.2)) < log_odds(match) - 3.0, "it lies on walls seen from behind"
+    near, far = challenged(match, match.height - 2.0), challenged(match, match.height - 1e3)
+    assert (near.margin, far.margin) == (pytest.approx(2.0), match.margin)
+    assert near.odds < far.odds == match.odds
 
 
 def test_a_wall_seen_from_its_other_side_is_told_from_the_same_wall() -> None:
@@ -139,7 +176,7 @@ def test_a_wall_seen_from_its_other_side_is_told_from_the_same_wall() -> None:
 
 def test_a_scan_that_fits_best_where_the_one_before_was_made_needs_more() -> None:
     scan = seen(KEYHOLE, 0.3, 0.2, 0.1, seed=2)
-    match = replace(matched(scan, seen(KEYHOLE, 0.0, 0.0, 0.0)), margin=8.0, hold=0.1, alone=0.9)
+    match = replace(matched(scan, seen(KEYHOLE, 0.0, 0.0, 0.0)), odds=4.0)
     here, there = (Prior(x_m, 0.0, 3.0, 0.1, 0.1) for x_m in (0.0, -1.5))
     assert judge(scan.scan, match, 0, here, chained=True).status == "doubtful"
     assert judge(scan.scan, match, 0, there, chained=True).status == "placed"
@@ -154,4 +191,4 @@ def test_a_scan_of_few_points_says_little() -> None:
     part = sight_of(whole.scan, replace(whole.returns, range_m=range_m, free_m=free_m), CONFIG)
     full, third = (matched(each, seen(KEYHOLE, 0.0, 0.0, 0.0)) for each in (whole, part))
     assert third.height < full.height
-    assert log_odds(third) < log_odds(full)
+    assert third.odds < full.odds

@@ -18,8 +18,8 @@ from fill.candidates import FEATURES
 from fill.certainty import DESIGN, design_of
 from fill.closing import close_holes, fill_cells, open_walls
 from fill.matching import candidates
-from fill.trees import Trees
 from fill.witness import distances, witness
+from mapping.trees import Trees
 from mapping.values import FREE, OCCUPIED
 from tools.bench.holes_damage import damage
 from tools.bench.holes_gates import shut

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from fill.candidates import FEATURES
 from fill.certainty import DESIGN, HIGHEST, LOWEST, falling, log_odds, whole_features
 from fill.logistic import Logistic, sigmoid
-from fill.trees import planted
+from mapping.trees import planted
 from tools.bench.holes_outcomes import Case, Filling, Tried, cases, filled, tried
 from tools.bench.holes_trees import Grown, Growth, grow, table
 from tools.files import replace_file
@@ -128,7 +128,7 @@ def site_covariance(task: Task, told: Floats) -> Floats:
 
 
 def _write(path: Path, facts: str, grown: Grown, names: tuple[str, ...], more: list[str]) -> None:
-    """Write trees as a Python module that ``fill.trees.planted`` reads."""
+    """Write trees as a Python module that ``mapping.trees.planted`` reads."""
     trees = table(grown, names)
     lines = [
         '"""Trees of the prior, written by ``lacuna bench holes --fit-prior``: do not edit.',
@@ -141,7 +141,7 @@ def _write(path: Path, facts: str, grown: Grown, names: tuple[str, ...], more: l
         "",
         "from typing import Final",
         "",
-        "from fill.trees import Table",
+        "from mapping.trees import Table",
         "",
         *more,
         "TREES: Final = Table(",

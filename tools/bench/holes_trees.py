@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fill.logistic import sigmoid
-from fill.trees import PER_ONE, Table
+from mapping.trees import PER_ONE, Table
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -80,7 +80,7 @@ def grow(x: Floats, right: Floats, count: Floats, growth: Growth) -> Grown:
 
 
 def table(grown: Grown, names: tuple[str, ...]) -> Table:
-    """Return trees as ``fill.trees.planted`` reads them; features that no tree uses are left out."""
+    """Return trees as ``mapping.trees.planted`` reads them; features that no tree uses are left out."""
     used = np.unique(grown.feature)
     most = np.array([len(grown.cuts[index]) for index in used])
     rank = np.searchsorted(used, grown.feature)

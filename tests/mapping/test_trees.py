@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from fill.trees import Table, Trees, planted
+from mapping.trees import Table, Trees, planted
 from tools.bench.holes_trees import Growth, grow, table
 
 NAMES = ("wet", "long", "bent")

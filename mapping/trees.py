@@ -13,8 +13,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from fill.logistic import sigmoid
-
 PER_ONE: Final = 1000
 """Leaves count in thousandths of log-odds."""
 
@@ -83,3 +81,8 @@ def _places(written: list[float], features: int) -> NDArray[np.float64]:
     for row, values in zip(places, rows, strict=True):
         row[: len(values)] = values
     return places
+
+
+def sigmoid(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Logistic function, safe for any size of ``x``."""
+    return 0.5 * (1.0 + np.tanh(0.5 * x))
