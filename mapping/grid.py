@@ -40,7 +40,7 @@ class Cells:
 
 
 class Canvas:
-    """Draws grids, and works out a scan's cells anew only where its pose moved by more than one would see.
+    """Works out a scan's cells, anew only where its pose moved by more than one would see.
 
     It keeps the cells of all scans, or of the ``most`` that were worked out last.
     """
@@ -49,10 +49,6 @@ class Canvas:
         self._config, self._most = config, most
         # The evidence is kept with its cells, so that its id stays its own.
         self._kept: dict[int, tuple[PolarEvidence, Pose, Cells]] = {}
-
-    def render(self, placed: Sequence[Placed]) -> Grid:
-        """Draw scans at their poses."""
-        return gather([self.cells(pose, evidence) for pose, evidence in placed], self._config)
 
     def cells(self, pose: Pose, evidence: PolarEvidence) -> Cells:
         """Cells of a scan at a pose, or at the pose next to it at which they were drawn before."""

@@ -17,7 +17,8 @@ from config.schema import Map
 from mapping.chart import Charts
 from mapping.ensemble import DRAWS, Mixture, draw, mix
 from mapping.graph import seen_from
-from mapping.grid import Canvas
+from mapping.grid import Canvas, Cells, gather
+from mapping.hidden import seen_by
 from mapping.hypotheses import ASKED, lies
 from mapping.led import along, led
 from mapping.levels import levels_of
@@ -113,17 +114,25 @@ class Stations:
         solution = self._pieces.solution(drawn[0])
         at = np.array([solution.stations.index(k) for k in drawn])
         off = draw(solution.covariance, np.random.default_rng([self._config.seed, len(self._sights)]))[:, at]
-        placed = [(self._told[k].pose, self._canvas.cells(self._told[k].pose, self._sights[k].evidence)) for k in drawn]
-        return mix(self.grid(), placed, off)
+        poses, cells = [self._told[k].pose for k in drawn], self._shown(drawn)
+        return mix(self.grid(), list(zip(poses, cells, strict=True)), off)
 
     def plans(self) -> list[list[int]]:
         """Sort the stations of the map by the plan that they show: wells taper."""
-        cells = [self._canvas.cells(self._told[k].pose, self._sights[k].evidence) for k in self._map]
+        cells = [self._cells(k) for k in self._map]
         depths_m = [self._sights[k].scan.depth_m for k in self._map]
         return [[self._map[k] for k in plan] for plan in levels_of(depths_m, cells, self._config)]
 
     def _draw(self, stations: Sequence[int]) -> Grid:
-        return self._canvas.render([(self._told[k].pose, self._sights[k].evidence) for k in self._fresh(stations)])
+        return gather(self._shown(self._fresh(stations)), self._config)
+
+    def _shown(self, stations: Sequence[int]) -> list[Cells]:
+        """Give what stations say, less what each would say behind walls that all of them show."""
+        cells = [self._cells(k) for k in stations]
+        return seen_by([self._told[k].pose for k in stations], cells, gather(cells, self._config))
+
+    def _cells(self, station: int) -> Cells:
+        return self._canvas.cells(self._told[station].pose, self._sights[station].evidence)
 
     def _fresh(self, stations: Sequence[int]) -> list[int]:
         """Of stations that show the same speckle from the same place, one: frozen speckle is no second witness."""

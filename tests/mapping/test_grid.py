@@ -105,13 +105,17 @@ def test_a_canvas_draws_to_the_byte_what_a_full_drawing_does() -> None:
     evidence = [evidence_of(RECTANGLE, sd_m=0.01 * (k + 1)) for k in range(6)]
     placed = [(Pose(*rng.normal(0.0, 1.0, 3)), each) for each in evidence]
     canvas = grids.Canvas(Map())
-    canvas.render(placed)
+    drawn(canvas, placed)
     moved = [*placed[:2], (Pose(0.5, -0.2, 0.1), evidence[2]), *placed[3:5], (Pose(0.1, 0.1, 0.0), evidence[0])]
-    whole, again = grids.render(moved, Map()), canvas.render(moved)
+    whole, again = grids.render(moved, Map()), drawn(canvas, moved)
     assert (again.x0_m, again.y0_m) == (whole.x0_m, whole.y0_m)
     assert again.log_odds.tobytes() == whole.log_odds.tobytes()
     assert again.state.tobytes() == whole.state.tobytes()
-    assert canvas.render([]).state.shape == (0, 0)
+    assert drawn(canvas, []).state.shape == (0, 0)
+
+
+def drawn(canvas: grids.Canvas, placed: list[tuple[Pose, PolarEvidence]]) -> Grid:
+    return grids.gather([canvas.cells(pose, evidence) for pose, evidence in placed], Map())
 
 
 def test_only_scans_that_moved_are_worked_out_anew(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -125,8 +129,8 @@ def test_only_scans_that_moved_are_worked_out_anew(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(grids, "cells_of", counted)
     placed = [(Pose(0.1 * k, 0.0, 0.0), evidence_of(RECTANGLE)) for k in range(4)]
     canvas = grids.Canvas(Map())
-    canvas.render(placed)
-    canvas.render([*placed[:3], (Pose(2.0, 0.0, 0.0), placed[3][1])])
+    drawn(canvas, placed)
+    drawn(canvas, [*placed[:3], (Pose(2.0, 0.0, 0.0), placed[3][1])])
     assert worked_out == [pose for pose, _ in placed] + [Pose(2.0, 0.0, 0.0)]
 
 
