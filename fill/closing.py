@@ -16,6 +16,7 @@ from fill.freedom import capped
 from fill.matching import asked, assign, candidates, gain
 from fill.memory import Memory
 from fill.segments import EIGHT, End, Walls
+from fill.settling import settled
 from mapping.trees import Trees
 from mapping.values import OCCUPIED, UNKNOWN
 
@@ -94,8 +95,9 @@ def _close_round(
     gains = [gain(chance, asked(each, threshold)) for chance, each in zip(chances.tolist(), found, strict=True)]
     for index in assign(found, gains):
         rivals = _rivals(index, found, by_end, chances)
-        for cells, away in _stretches(found[index], state, wall, memory):
-            closed.append(Closed(found[index], cells, away, float(chances[index]), rivals))
+        best = settled(found[index], state, memory)
+        for cells, away in _stretches(best, state, wall, memory):
+            closed.append(Closed(best, cells, away, float(chances[index]), rivals))
             wall[cells[:, 0], cells[:, 1]] = True
     return closed
 
@@ -147,7 +149,7 @@ def _stretches(
     def made() -> list[tuple[NDArray[np.int32], NDArray[np.float64]]]:
         return [(cells, _away(cells, candidate)) for cells in _taken(candidate, low, open_here)]
 
-    return memory.recent(("cells", candidate.way, open_here.tobytes()), made)
+    return memory.recent(("cells", candidate.way, candidate.path.tobytes(), open_here.tobytes()), made)
 
 
 def _room(

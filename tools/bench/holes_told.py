@@ -14,6 +14,7 @@ from fill.matching import candidates
 from fill.memory import Memory
 from fill.prior import prior
 from fill.segments import End
+from fill.settling import settled
 from mapping.values import OCCUPIED
 
 _REACH: Final = 20.0  # cells: no knocked-out piece is as long
@@ -37,7 +38,7 @@ def fill_told(seen: NDArray[np.uint8], gone: NDArray[np.bool_]) -> NDArray[np.bo
         own = [index for index, each in enumerate(found) if _belongs(each, away)]
         if own:
             best = found[max(own, key=lambda index: chances[index])]
-            for cells in fill_cells(best, seen, wall):
+            for cells in fill_cells(settled(best, seen, memory), seen, wall):
                 filled[cells[:, 0], cells[:, 1]] = True
     return filled
 
