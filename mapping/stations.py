@@ -22,6 +22,7 @@ from mapping.hidden import seen_by
 from mapping.hypotheses import ASKED, lies
 from mapping.led import along, led
 from mapping.levels import levels_of
+from mapping.loops import around, closing
 from mapping.pieces import Pieces
 from mapping.prior import Hint, Prior, agreed
 from mapping.register import challenged
@@ -74,6 +75,7 @@ class Stations:
         self._hints.append(hint)
         self._judged.append(self._place(i))
         self._join()
+        self._close(i)
         self._tell()
         return self._told[i]
 
@@ -256,6 +258,19 @@ class Stations:
                 fit = other if other.height > fit.height else fit
             if fit.is_sure:
                 self._pieces.close(base, lead, fit.pose, fit.covariance)
+
+    def _close(self, i: int) -> None:
+        """Close the loop that a scan may end, in its piece, or round from the piece before."""
+        piece = self._pieces.of(i)
+        if not piece:
+            return
+        loop = closing(self._pieces, self._charts, i, self._config)
+        before = [k for k in range(max(piece[0] - BACK, 0), piece[0]) if self._pieces.of(k)]
+        if loop is None and before and i > piece[0]:
+            prior = self._prior(piece[0], before[-1])
+            loop = around(self._pieces, self._charts, (before[-1], piece[0]), i, prior, self._config)
+        if loop is not None:
+            self._pieces.close(loop.one, loop.other, loop.pose, loop.covariance)
 
     def _apart(self) -> tuple[int, int] | None:
         """Find the last two scans that follow each other in two pieces which have grown since they were tried."""
