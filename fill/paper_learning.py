@@ -26,7 +26,7 @@ _SHORTEST: Final = 3
 _LONGEST: Final = 40  # steps: no longer hole is knocked out
 _SIDES: Final = (10, 6, 3)  # cells seen on either side of a hole: as many as a segment has
 _MARGIN: Final = 64  # cells about the grid where a fit may run and hits nothing
-_AT_ONCE: Final = 1024
+_AT_ONCE: Final = 4096
 _ENOUGH: Final = 20_000  # holes of one size: more teach nothing new
 
 Cells = NDArray[np.int64]

@@ -111,6 +111,7 @@ def _steps(graph: csr_array, sources: NDArray[np.int64]) -> NDArray[np.int64]:
 
 def _farthest(away: NDArray[np.int64], part: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return of each segment the farthest node, of equals the first."""
-    order = np.lexsort((np.arange(len(away)), -away, part))
-    _, firsts = np.unique(part[order], return_index=True)
-    return np.asarray(order[firsts], np.int64)
+    count = len(away)
+    best = np.full(int(part.max()) + 1, -1, np.int64)
+    np.maximum.at(best, part, away * count + np.arange(count)[::-1])
+    return count - 1 - best[best >= 0] % count
