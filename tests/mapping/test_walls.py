@@ -8,12 +8,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from config.schema import Map
 from mapping.between import Frame, Seen, continued_m, expected_m, faint_behind, firm, peak_near, sides, veils
 from mapping.clutter import deaf_m, lobe_weights, smoothed, without_ringing
+from mapping.echoes import beams_of, in_order, of_lobes
 from mapping.lean import Line, late_m, nearer_m
 from mapping.lines import Fit, fit_walls
 from mapping.mirror import Heard, images
 from mapping.peaks import CENTRE_M, TAIL_M, centre_m, longer_m
+from mapping.values import Scan
 from tests.mapping.rooms import RECTANGLE, STEP_RAD, cast
 
 BIN_M = 0.02
@@ -135,6 +138,17 @@ def test_the_side_lobe_of_a_clear_wall_counts_less_and_the_wall_itself_in_full()
     assert weights[44, 100] == weights[56, 100] == 0.5
     assert weights[50, 100] == weights[44, 200] == weights[56, 200] == 1.0
     assert lobe_weights(smooth[:60], STEP_RAD, closed=False).shape == (60, 300)
+
+
+def test_an_echo_is_of_side_lobes_where_it_is_loudest_not_at_its_leading_edge() -> None:
+    echoes = np.full((200, 300), 10, np.uint8)
+    echoes[48:53, 100:104] = 200  # a pillar without anything behind it
+    echoes[[44, 56], 99] = 110  # the leading edge of its ring, before its own range
+    echoes[[44, 56], 100:104] = 130
+    echoes[100, 100:104] = 130  # and a wall elsewhere
+    scan = Scan(0, 0, 1, 0.0, 1.0, BEARING, echoes, BIN_M, STEP_RAD, "full")
+    beams = beams_of(scan, *in_order(scan)[:1], Map(), closed=True)
+    assert of_lobes(beams, np.full(200, 99))[[44, 50, 56, 100]].tolist() == [True, False, True, False]
 
 
 @given(range_m=st.floats(0.5, 7.0))
