@@ -12,6 +12,7 @@ from scipy.ndimage import maximum_filter
 
 from config.schema import Map
 from mapping.beam import HINT_LOG_ODDS, PolarEvidence
+from mapping.tiles import TILE, reaches_of, tiles_of
 from mapping.values import FREE, OCCUPIED, UNKNOWN, Grid, Pose
 
 CLAMP_OCCUPIED = 4.6
@@ -39,6 +40,16 @@ class Cells:
     log_odds: NDArray[np.float32]
 
 
+@dataclass(frozen=True, slots=True)
+class _Kept:
+    """A scan's cells at a pose, and how far it says anything, of ``mapping.tiles``."""
+
+    evidence: PolarEvidence
+    reaches_m: NDArray[np.float64]
+    pose: Pose
+    cells: Cells
+
+
 class Canvas:
     """Works out a scan's cells, anew only where its pose moved by more than one would see.
 
@@ -48,18 +59,19 @@ class Canvas:
     def __init__(self, config: Map, most: int | None = None) -> None:
         self._config, self._most = config, most
         # The evidence is kept with its cells, so that its id stays its own.
-        self._kept: dict[int, tuple[PolarEvidence, Pose, Cells]] = {}
+        self._kept: dict[int, _Kept] = {}
 
     def cells(self, pose: Pose, evidence: PolarEvidence) -> Cells:
         """Cells of a scan at a pose, or at the pose next to it at which they were drawn before."""
         known = self._kept.get(id(evidence))
-        if known is None or not _same(known[1], pose):
-            known = evidence, pose, cells_of(pose, evidence, self._config.cell_m)
+        if known is None or not _same(known.pose, pose):
+            reaches_m = reaches_of(evidence) if known is None else known.reaches_m
+            known = _Kept(evidence, reaches_m, pose, cells_of(pose, evidence, self._config.cell_m, reaches_m))
             self._kept.pop(id(evidence), None)
             self._kept[id(evidence)] = known
             if self._most is not None and len(self._kept) > self._most:
                 del self._kept[next(iter(self._kept))]
-        return known[2]
+        return known.cells
 
 
 def _same(a: Pose, b: Pose) -> bool:
@@ -77,21 +89,25 @@ def render(placed: Sequence[Placed], config: Map) -> Grid:
     return gather([cells_of(pose, evidence, config.cell_m) for pose, evidence in placed], config)
 
 
-def cells_of(pose: Pose, evidence: PolarEvidence, cell_m: float) -> Cells:
-    """Bring one scan into the map's cells: each cell's centre looks up its own bearing and range."""
+def cells_of(pose: Pose, evidence: PolarEvidence, cell_m: float, reaches_m: NDArray[np.float64] | None = None) -> Cells:
+    """Bring one scan into the map's cells: each cell's centre looks up its own bearing and range.
+
+    ``reaches_m`` is what ``reaches_of`` gives, where it is known.
+    """
     table = evidence.log_odds
-    reach = table.shape[1] * evidence.range_step_m
-    south, west = math.floor((pose.y_m - reach) / cell_m), math.floor((pose.x_m - reach) / cell_m)
-    rows = np.arange(south, math.ceil((pose.y_m + reach) / cell_m))
-    cols = np.arange(west, math.ceil((pose.x_m + reach) / cell_m))
-    y = ((rows + 0.5) * cell_m - pose.y_m).astype(np.float32)[:, None]
-    x = ((cols + 0.5) * cell_m - pose.x_m).astype(np.float32)[None, :]
+    reaches_m = reaches_of(evidence) if reaches_m is None else reaches_m
+    south, west = tiles_of(pose, evidence, reaches_m, cell_m)
+    rows = south[:, None] + np.arange(TILE)
+    cols = west[:, None] + np.arange(TILE)
+    y = ((rows + 0.5) * cell_m - pose.y_m).astype(np.float32)[:, :, None]
+    x = ((cols + 0.5) * cell_m - pose.x_m).astype(np.float32)[:, None, :]
     turn = np.arctan2(x, y) - np.float32(pose.heading_rad)
     bearing = np.floor(turn * (table.shape[0] / (2.0 * math.pi)) + 0.5).astype(np.intp) % table.shape[0]
     reached = (np.sqrt(x * x + y * y) / evidence.range_step_m).astype(np.intp)
     told = np.where(reached < table.shape[1], table[bearing, np.minimum(reached, table.shape[1] - 1)], 0.0)
-    row, col = np.nonzero(told)
-    return Cells((row + south).astype(np.int32), (col + west).astype(np.int32), told[row, col].astype(np.float32))
+    tile, row, col = np.nonzero(told)
+    at = rows[tile, row].astype(np.int32), cols[tile, col].astype(np.int32)
+    return Cells(*at, told[tile, row, col].astype(np.float32))
 
 
 def gather(scans: Sequence[Cells], config: Map) -> Grid:

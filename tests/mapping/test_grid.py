@@ -122,9 +122,9 @@ def test_only_scans_that_moved_are_worked_out_anew(monkeypatch: pytest.MonkeyPat
     worked_out: list[Pose] = []
     honest = grids.cells_of
 
-    def counted(pose: Pose, evidence: PolarEvidence, cell_m: float) -> grids.Cells:
+    def counted(pose: Pose, evidence: PolarEvidence, cell_m: float, reaches_m: np.ndarray) -> grids.Cells:
         worked_out.append(pose)
-        return honest(pose, evidence, cell_m)
+        return honest(pose, evidence, cell_m, reaches_m)
 
     monkeypatch.setattr(grids, "cells_of", counted)
     placed = [(Pose(0.1 * k, 0.0, 0.0), evidence_of(RECTANGLE)) for k in range(4)]
