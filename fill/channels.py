@@ -31,8 +31,12 @@ _SMOOTHINGS: Final = 2
 Layer = NDArray[np.float64]
 
 
-def channels(a: End, b: End, scene: Scene) -> list[Curve]:
-    """Ways between two ends: at the depth of the walls behind the water's edge, and in the middle of the unknown."""
+def channels(a: End, b: End, scene: Scene) -> list[tuple[Curve, NDArray[np.int32]]]:
+    """Ways between two ends: at the depth of the walls behind the water's edge, and in the middle of the unknown.
+
+    With each come the cells ``(n, 2)`` that it was found in, row and column: the curve is smooth, and where the unknown
+    is narrow it may touch water that they do not.
+    """
     gap = math.hypot(b.x - a.x, b.y - a.y)
     if gap < _SHORTEST:
         return []
@@ -45,7 +49,7 @@ def channels(a: End, b: End, scene: Scene) -> list[Curve]:
     for name, cost in (("shore", shore), ("channel", middle)):
         way = _way(np.where(water <= 0.0, -1.0, cost), a, b, low)
         if way is not None and len(way) <= _LONGEST * gap + _BEYOND:
-            found.append(Curve(name, sampled(_smooth(way))))
+            found.append((Curve(name, sampled(_smooth(way))), cell_at(way[:, ::-1]).astype(np.int32)))
     return found
 
 

@@ -23,6 +23,7 @@ from mapping.values import OCCUPIED, UNKNOWN
 THRESHOLD: Final = 0.3
 """A fill less likely right than this is not drawn: the end stays open."""
 _MOST_ENDS: Final = 1500
+_ONE_END: Final = 0.3  # log-odds: of two ways as likely, that is taken which leaves no end open
 _SMALL: Final = 12.0  # cells: gaps that are closed before any larger one is looked at
 
 
@@ -92,7 +93,10 @@ def _close_round(
     chances = model.chance(np.stack([each.features for each in found]))
     by_end = _by_end(found)
     closed: list[Closed] = []
-    gains = [gain(chance, asked(each, threshold)) for chance, each in zip(chances.tolist(), found, strict=True)]
+    gains = [
+        gain(chance, asked(each, threshold)) - _ONE_END * each.side
+        for chance, each in zip(chances.tolist(), found, strict=True)
+    ]
     for index in assign(found, gains):
         rivals = _rivals(index, found, by_end, chances)
         best = settled(found[index], state, memory)

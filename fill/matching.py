@@ -25,7 +25,7 @@ _PARTNERS: Final = 8  # candidates of an end that are worth drawing
 _WATER_BOTH: Final = FEATURES.index("water both")
 _WET: Final = 0.05  # of the way has water on both sides
 _PASSABLE: Final = 4.0  # cells; narrower gaps are no way through
-_WAY_THROUGH: Final = 0.5  # of ways and holes that look alike, a way walled up is the greater loss
+_WAY_THROUGH: Final = 0.65  # of ways and holes that look alike, a way walled up is the greater loss
 _EXACT: Final = 14  # up to so many candidates in conflict are solved exactly
 
 

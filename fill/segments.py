@@ -27,6 +27,10 @@ _WEIGHTS: Final = np.linspace(1.0, 0.4, SUPPORT + 1)  # the nearest part of a wa
 _BENDABLE: Final = 16  # cells of centre line from which a bend can be told
 _CLEARLY: Final = 0.5
 _EVEN: Final = 0.5  # cells off the parabola: more is a corner
+_OFF_TIP: Final = 1.0  # cells: an axis that misses the tip by more does not tell where the wall ends
+_CORNER: Final = math.radians(45.0)
+_LIMB: Final = (2, 9)  # cells of wall between a tip and the corner before it
+_STRAIGHT: Final = 0.75  # cells off its chord at most
 _SPUR_ROUNDS: Final = 2
 _TO_NEXT: Final = 0.5 + 1e-6  # of a cell
 _DOT: Final = 3  # cells: less has no length
@@ -182,7 +186,9 @@ def _end(
         return None
     places = lines.places(path)
     line = smooth(places - places[0])  # from the tip, so that nothing hangs on where the grid begins
-    foot, out, wander = direction(line)
+    foot, out, wander = direction(line[: _limb(line)])
+    if math.hypot(*(foot - line[0])) > _OFF_TIP:
+        foot = line[0]
     reach = _to_edge(foot, out, half, places[0] + 1)
     steps = line[1:] - line[:-1]
     length = float(np.hypot(steps[:, 0], steps[:, 1]).sum()) + reach
@@ -231,6 +237,22 @@ def direction(line: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[n
     foot = middle + out * along[0] + normal * (bend[0] + bend[1] * along[0] + bend[2] * along[0] ** 2)
     left = np.abs(bend[0] + bend[1] * along + bend[2] * along**2 - aside)
     return foot, (out + normal * slope) / math.hypot(1.0, slope), float(left.mean())
+
+
+def _limb(line: NDArray[np.float64]) -> int:
+    """Return how many places of a line, from its tip, lie before a corner close behind the tip; all if there is none.
+
+    A wall cut off just after a corner goes on as the short limb does, not as the long one.
+    """
+    best, found = _CORNER, len(line)
+    for last in range(_LIMB[0], min(_LIMB[1], len(line) - 4)):
+        out, before = line[0] - line[last], line[last] - line[min(last + _LIMB[1], len(line) - 1)]
+        size = math.hypot(*out)
+        aside = np.abs((line[: last + 1] - line[last]) @ (-out[1], out[0])) / size
+        angle = math.acos(max(-1.0, min(1.0, float(out @ before) / (size * math.hypot(*before)))))
+        if angle > best and aside.max() < _STRAIGHT:
+            best, found = angle, last + 1
+    return found
 
 
 def _bend(along: NDArray[np.float64], aside: NDArray[np.float64]) -> NDArray[np.float64] | None:

@@ -78,8 +78,10 @@ def across(a: End, b: End, scene: Scene) -> Drawn:
         way = _first_clear(curve, heights, (a, b), between, scene)
         if way is not None and _new(way, found):
             found.append(way)
-    for curve in channels(a, b, scene):
-        path = _path(curve, (a, b), scene)
+    for curve, cells in channels(a, b, scene):
+        path = _path(cells_of(curve.points), (a, b), scene)
+        if path is None:
+            path = _path(cells, (a, b), scene)
         if path is not None:
             way = Way((a, b), False, between, curve, path, 0)
             found += [way] if _new(way, found) else []
@@ -96,7 +98,7 @@ def onto_sides(a: End, scene: Scene, longest: float) -> Drawn:
         into = (a.x - x) / gap, (a.y - y) / gap
         b = End(x, y, *into, a.half, a.line, a.length, a.wander, int(scene.walls.label[row, col]))
         curve = straight(a.x, a.y, x, y, "side")
-        path = _path(curve, (a, b), scene)
+        path = _path(cells_of(curve.points), (a, b), scene)
         if path is not None:
             found.append(Way((a, b), True, chord(a, b), curve, path, rank))
     return Drawn(found, looked, 2.0)
@@ -121,14 +123,14 @@ def _first_clear(
     crosses = np.any(at(scene.state, points[..., 0], points[..., 1]) == FREE, axis=1)
     for rank in np.flatnonzero(~crosses).tolist():
         bow = Curve(curve.name, points[rank])
-        path = _path(bow, ends, scene)
+        path = _path(cells_of(bow.points), ends, scene)
         if path is not None:
             return Way(ends, False, between, bow, path, rank)
     return None
 
 
-def _path(curve: Curve, ends: tuple[End, End], scene: Scene) -> NDArray[np.int32] | None:
-    path = clear_path(cells_of(curve.points), scene.state)
+def _path(cells: NDArray[np.int32], ends: tuple[End, End], scene: Scene) -> NDArray[np.int32] | None:
+    path = clear_path(cells, scene.state)
     if path is None:
         return None
     met = scene.walls.label[path[:, 0], path[:, 1]]

@@ -117,7 +117,6 @@ def test_a_way_between_two_chambers_stays_open_though_its_middle_was_not_seen(fi
     assert not np.any(filled.hole[36:44, 58:74] >= 0)
 
 
-@pytest.mark.xfail(strict=True, reason="where no wall of a passage was seen, both chambers' walls are drawn across it")
 def test_a_way_between_two_chambers_stays_open_though_nothing_of_it_was_seen(fill: Fills) -> None:
     filled = fill(two_chambers())
     assert not np.any(filled.hole[36:44, 58:74] >= 0)

@@ -57,6 +57,16 @@ def test_a_bent_wall_ends_in_the_direction_it_has_there() -> None:
         assert abs(math.sin(turn)) < math.sin(math.radians(9))
 
 
+@pytest.mark.parametrize("limb", [3, 5])
+def test_a_wall_cut_off_just_after_a_corner_ends_as_its_short_limb_does(limb: int) -> None:
+    mask = blank()
+    mask[10:40, 30] = True
+    mask[40, 30 : 31 + limb] = True
+    end = max(find_walls(mask).ends, key=lambda each: each.y)
+    assert (end.x, end.y) == pytest.approx((30 + limb, 40), abs=1.0)
+    assert abs(math.atan2(end.dy, end.dx)) < math.radians(20)
+
+
 def test_solid_ground_is_not_a_wall() -> None:
     mask = np.ones((60, 60), bool)
     mask[20:40, 20:40] = False

@@ -42,6 +42,18 @@ def test_a_strip_between_two_waters_is_snug_and_surely_a_hole() -> None:
     assert chance(best) > 0.8
 
 
+def test_a_crooked_strip_one_cell_wide_is_followed() -> None:
+    state = np.full((40, 60), FREE, np.uint8)
+    line = [(20, col) for col in range(5, 25)] + [(21, 24), (21, 25), (22, 25), (22, 26), (22, 27), (23, 27), (23, 28)]
+    line += [(24, 28), (24, 29), (25, 29), (25, 30)] + [(25, col) for col in range(31, 55)]
+    rows, cols = np.array(line).T
+    state[rows, cols] = OCCUPIED
+    lost = (cols > 22) & (cols < 33)
+    state[rows[lost], cols[lost]] = UNKNOWN
+    drawn = {tuple(cell) for each in found(state) for cell in each.path.tolist()}
+    assert {cell for cell, gone in zip(line, lost.tolist(), strict=True) if gone} <= drawn
+
+
 def test_no_way_crosses_free_water() -> None:
     random = np.random.default_rng(3)
     state = slab(slice(40, 60), halo=6)
