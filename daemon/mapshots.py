@@ -72,6 +72,7 @@ def fill(stamp: Stamp, filled: Filled) -> Snapshot:
         **_place(filled.grid),
         "holes": [_hole(each) for each in filled.holes],
         "open_ends_m": _points(filled.open_ends_m),
+        "noise_ends": filled.noise_ends,
     }
     arrays = {"row": row.astype(np.int32), "col": col.astype(np.int32), "certainty": certainty}
     return Snapshot("fill", *stamp, fields, {**arrays, "hole": filled.hole[row, col]})

@@ -59,20 +59,32 @@ def close_holes(
     return closed
 
 
-def open_ends(state: NDArray[np.uint8], closed: list[Closed], memory: Memory | None = None) -> NDArray[np.float64]:
-    """Return the ends of walls ``(n, 2)``, x and y in cells, that are still open with these holes closed."""
+def left_open(
+    state: NDArray[np.uint8], closed: list[Closed], memory: Memory | None = None
+) -> tuple[NDArray[np.float64], int]:
+    """Return the ends of walls ``(n, 2)``, x and y in cells, that are still open with these holes closed.
+
+    The second is how many ends were not looked at, since they are more than any site has: noise.
+    """
     wall = state == OCCUPIED
     for each in closed:
         wall[each.cells[:, 0], each.cells[:, 1]] = True
-    return np.array([(end.x, end.y) for end in open_walls(wall, state, memory or Memory()).ends]).reshape(-1, 2)
+    walls = _uncapped(wall, state, memory or Memory())
+    ends = _longest(walls.ends)
+    noise = len(walls.ends) - len(ends) + int(np.count_nonzero(walls.noise))
+    return np.array([(end.x, end.y) for end in ends]).reshape(-1, 2), noise
 
 
 def open_walls(wall: NDArray[np.bool_], state: NDArray[np.uint8], memory: Memory | None = None) -> Walls:
     """Find the walls, and of their ends those that were not seen to be the end."""
-    memory = memory or Memory()
+    walls = _uncapped(wall, state, memory or Memory())
+    return dataclasses.replace(walls, ends=_longest(walls.ends))
+
+
+def _uncapped(wall: NDArray[np.bool_], state: NDArray[np.uint8], memory: Memory) -> Walls:
     walls = memory.walls(wall, state)
     ends = (end for end, shut in zip(walls.ends, capped(walls.ends, state).tolist(), strict=True) if not shut)
-    return dataclasses.replace(walls, ends=_longest(tuple(ends)))
+    return dataclasses.replace(walls, ends=tuple(ends))
 
 
 def _longest(ends: tuple[End, ...]) -> tuple[End, ...]:

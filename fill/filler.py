@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from config.schema import Fill
 from fill.certainty import Belief
-from fill.closing import close_holes, open_ends
+from fill.closing import close_holes, left_open
 from fill.knockout import places, window
 from fill.lessons import hold, taught
 from fill.memory import Memory
@@ -42,9 +42,10 @@ class Filler:
             longest = self._config.max_gap_m / grid.cell_m
             if self._config.method == "paper":
                 holes, left = paper_fill(grid, longest, np.random.default_rng(self._config.seed))
+                noise = 0
             else:
-                holes, left = self._chord_fill(grid, longest)
-            self._last = filled_grid(grid, holes, places_m(left, grid))
+                holes, left, noise = self._chord_fill(grid, longest)
+            self._last = filled_grid(grid, holes, places_m(left, grid), noise)
             self._seen = grid.state.copy()  # the caller may go on to draw in it
         return dataclasses.replace(self._last, grid=grid)
 
@@ -52,7 +53,7 @@ class Filler:
         places = ((each.cell_m, each.x0_m, each.y0_m) for each in (one, other))
         return len(set(places)) == 1 and np.array_equal(self._seen, other.state)
 
-    def _chord_fill(self, grid: Grid, longest: float) -> tuple[tuple[Hole, ...], NDArray[np.float64]]:
+    def _chord_fill(self, grid: Grid, longest: float) -> tuple[tuple[Hole, ...], NDArray[np.float64], int]:
         for memory in (self._memory, self._exams):
             memory.begin()
         closed = close_holes(grid.state, longest, self._prior.hole, memory=self._memory)
@@ -60,7 +61,7 @@ class Filler:
         told = [heard(each, grid.state, self._prior, self._memory) for each in closed]
         ends = [(each.candidate.start, each.candidate.finish) for each in closed]
         ends_m = places_m(np.array(ends).reshape(-1, 2, 2), grid)
-        return tell(closed, told, belief, grid, ends_m), open_ends(grid.state, closed, self._memory)
+        return tell(closed, told, belief, grid, ends_m), *left_open(grid.state, closed, self._memory)
 
     def _school(self, grid: Grid, gaps: list[float]) -> Belief:
         """Teach the prior by exams on the site's own walls; an exam whose window did not change is not held again."""
@@ -73,7 +74,7 @@ class Filler:
         return taught(self._prior, [each for each in lessons if each is not None], gaps)
 
 
-def filled_grid(grid: Grid, holes: tuple[Hole, ...], open_ends_m: NDArray[np.float64]) -> Filled:
+def filled_grid(grid: Grid, holes: tuple[Hole, ...], open_ends_m: NDArray[np.float64], noise_ends: int = 0) -> Filled:
     """Lay the holes out as layers beside the evidence."""
     certainty = np.zeros(grid.state.shape, np.float32)
     layer = np.full(grid.state.shape, -1, np.int32)
@@ -81,7 +82,7 @@ def filled_grid(grid: Grid, holes: tuple[Hole, ...], open_ends_m: NDArray[np.flo
         rows, cols = hole.cells.T
         certainty[rows, cols] = hole.certainty
         layer[rows, cols] = hole.index
-    return Filled(grid, holes, certainty, layer, open_ends_m)
+    return Filled(grid, holes, certainty, layer, open_ends_m, noise_ends)
 
 
 def places_m(cells: NDArray[np.float64], grid: Grid) -> NDArray[np.float64]:

@@ -16,7 +16,7 @@ from scipy import ndimage
 
 from fill.recent import Recent
 from fill.scene import SPECK
-from fill.segments import EIGHT, End, Walls, find_walls
+from fill.segments import EIGHT, MOST_TIPS, End, Walls, find_walls
 
 Slices = tuple[slice, slice]
 Tokens = NDArray[np.int32]
@@ -57,10 +57,14 @@ class Finder:
 
     def find(self, mask: NDArray[np.bool_], before: Found | None) -> Found:
         """Find the walls of ``mask`` ``(rows, cols)``, from those of another of the same shape where there is one."""
-        if before is None:
-            none = np.zeros(mask.shape, np.int32)
-            bare = Walls(none.astype(bool), none, none.astype(np.float32), none.astype(bool), ())
-            before = Found(none.astype(bool), none, bare, {})
+        if before is not None and len(before.walls.tips) <= MOST_TIPS:
+            found = self._find(mask, before)
+            if len(found.walls.tips) <= MOST_TIPS:
+                return found
+        # With more, which walls are noise hangs on all the others.
+        return self._find(mask, _nothing(mask.shape))
+
+    def _find(self, mask: NDArray[np.bool_], before: Found) -> Found:
         changed = np.flatnonzero(mask != before.mask)
         if not len(changed):
             return before
@@ -114,6 +118,13 @@ class Finder:
         return self._ends.recall(key, lambda: dataclasses.replace(end, wall=token))
 
 
+def _nothing(shape: tuple[int, ...]) -> Found:
+    none = np.zeros(shape, np.int32)
+    bare = none.astype(bool)
+    tips = np.zeros((0, 2), np.int64)
+    return Found(bare, none, Walls(bare, none, none.astype(np.float32), bare, (), tips, np.zeros(0, bool)), {})
+
+
 def _touched(changed: NDArray[np.int64], before: Found) -> tuple[set[int], Slices]:
     """Tokens of walls in or next to cells that changed, and a window about them, one cell wider."""
     shape = before.part.shape
@@ -141,7 +152,12 @@ def _laid(before: Walls, fresh: Walls, part: Tokens, window: Slices, anew: NDArr
         np.copyto(layer[window], found, where=anew)
     label = before.label.copy()
     np.copyto(label[window], np.where(fresh.mask, part[window], 0), where=anew)
-    return Walls(mask, label, half, centre, ())
+    corner = window[0].start, window[1].start
+    rows, cols = before.tips.T
+    there = (rows >= corner[0]) & (rows < window[0].stop) & (cols >= corner[1]) & (cols < window[1].stop)
+    there[there] = anew[rows[there] - corner[0], cols[there] - corner[1]]
+    tips = np.concatenate([before.tips[~there], fresh.tips + corner])
+    return Walls(mask, label, half, centre, (), tips, np.concatenate([before.noise[~there], fresh.noise]))
 
 
 def _tip(end: End) -> tuple[float, float]:

@@ -11,6 +11,7 @@ Coordinates here are cells: x is the column, y the row, whole numbers at cell ce
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -35,7 +36,8 @@ _SPUR_ROUNDS: Final = 2
 _TO_NEXT: Final = 0.5 + 1e-6  # of a cell
 _DOT: Final = 3  # cells: less has no length
 _MOST_TIPS_OF_ONE: Final = 1000
-_MOST_TIPS: Final = 6000  # of the largest walls: in the largest real maps there are 2,200
+MOST_TIPS: Final = 6000
+"""Of the largest walls; in the largest real maps there are 2,200."""
 _SOLID: Final = 8.0  # cells from the nearest water: deeper is not wall but the ground behind it
 
 
@@ -65,7 +67,8 @@ class Walls:
     """Walls of one grid, in layers ``(rows, cols)``, and their ends.
 
     ``mask`` of wall cells, ``label`` of connected walls (0: none), ``half`` distance of each wall cell from the
-    wall's edge, ``centre`` mask of the centre lines.
+    wall's edge, ``centre`` mask of the centre lines.  ``tips`` ``(n, 2)`` int64 are row and column of the tips of lines
+    before spurs are pruned, and ``noise`` ``(n,)`` tells which were not looked at for ends, since no wall has so many.
     """
 
     mask: NDArray[np.bool_]
@@ -73,6 +76,8 @@ class Walls:
     half: NDArray[np.float32]
     centre: NDArray[np.bool_]
     ends: tuple[End, ...]
+    tips: NDArray[np.int64]
+    noise: NDArray[np.bool_]
 
 
 def find_walls(mask: NDArray[np.bool_], corner: tuple[int, int] = (0, 0), ended: bool = True) -> Walls:
@@ -86,23 +91,39 @@ def find_walls(mask: NDArray[np.bool_], corner: tuple[int, int] = (0, 0), ended:
     label = np.zeros(wall.shape, np.int32)
     ndimage.label(wall, EIGHT, output=label)
     lines = CentreLines(np.asarray(skeletonize(wall), np.bool_))  # type: ignore[no-untyped-call]
-    promising = _promising(lines.tips(wall), label)[label]
+    tips = np.array(lines.tips(wall), np.int64)
+    tips = tips[~_dots(label)[label.flat[tips]]]
+    noise = _noise(tips, label)
+    promising = ~(_dots(label) | noise)[label]
     lines.prune(half, promising)
     inner = slice(1, -1), slice(1, -1)
     found = (_end(at, lines, half, label, corner) for at in (lines.tips(promising) if ended else ()))
     kept = tuple(end for end in found if end is not None)
-    return Walls(wall[inner], label[inner], half[inner], lines.mask()[inner], kept)
+    return Walls(
+        wall[inner],
+        label[inner],
+        half[inner],
+        lines.mask()[inner],
+        kept,
+        lines.places(tips)[:, ::-1],
+        noise[label.flat[tips]],
+    )
 
 
-def _promising(tips: list[int], label: NDArray[np.int32]) -> NDArray[np.bool_]:
-    """Tell for each label whether its wall may have ends: dots have none, and what is all tips is noise, no wall."""
+def _dots(label: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """Tell for each label whether its wall is a dot, which has no ends."""
+    return np.bincount(label.ravel()) < _DOT
+
+
+def _noise(tips: NDArray[np.int64], label: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """Tell for each label whether it is all tips, and no wall; ``tips`` ``(n,)`` are cells numbered row by row."""
     size = np.bincount(label.ravel())
     count = np.bincount(label.ravel()[tips], minlength=len(size))
-    sane = (size >= _DOT) & (count <= _MOST_TIPS_OF_ONE)
-    largest = np.argsort(np.where(sane, -size, 0), kind="stable")
-    taken = np.cumsum(np.where(sane, count, 0)[largest])
-    sane[largest[taken > _MOST_TIPS]] = False
-    return sane
+    noise = count > _MOST_TIPS_OF_ONE
+    largest = np.argsort(np.where(noise, 0, -size), kind="stable")
+    taken = np.cumsum(np.where(noise, 0, count)[largest])
+    noise[largest[taken > MOST_TIPS]] = True
+    return noise
 
 
 def _depths(mask: NDArray[np.bool_]) -> NDArray[np.float32]:
@@ -160,9 +181,9 @@ class CentreLines:
             path.append(ahead[0])
         return path, False
 
-    def places(self, path: list[int]) -> NDArray[np.int64]:
+    def places(self, path: Sequence[int] | NDArray[np.int64]) -> NDArray[np.int64]:
         """Return x and y ``(n, 2)`` of cells, without the border."""
-        rows, cols = np.divmod(np.array(path), self._width)
+        rows, cols = np.divmod(np.asarray(path, np.int64), self._width)
         return np.stack([cols, rows], axis=1) - 1
 
     def _around(self, at: int) -> list[int]:

@@ -44,7 +44,8 @@ class Filled:
     """The evidence grid, untouched, with the holes filled in a layer of their own.
 
     ``certainty`` ``(rows, cols)`` float32, 0 where nothing is filled; ``hole`` ``(rows, cols)`` int32, the hole's
-    index or -1. ``open_ends_m`` is ``(n, 2)`` float64, x and y of wall ends that were left open.
+    index or -1. ``open_ends_m`` is ``(n, 2)`` float64, x and y of wall ends that were left open; ``noise_ends`` is how
+    many ends were not looked at, since no site has so many: what they belong to is noise.
     """
 
     grid: Grid
@@ -52,6 +53,7 @@ class Filled:
     certainty: NDArray[np.float32]
     hole: NDArray[np.int32]
     open_ends_m: NDArray[np.float64]
+    noise_ends: int = 0
 
 
 @dataclass(frozen=True, slots=True)

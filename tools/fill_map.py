@@ -57,6 +57,8 @@ def _origin(read: RosMap, path: Path, config: Config, site: str) -> Provenance:
 def _summary(state: MapState, folder: Path) -> str:
     holes = state.filled.holes
     lines = [f"{len(holes)} holes filled, {len(state.filled.open_ends_m)} ends left open"]
+    if state.filled.noise_ends:
+        lines.append(f"  {state.filled.noise_ends} ends more are not looked at: no site has so many, they are noise")
     for hole in sorted(holes, key=lambda each: -each.gap_m)[:10]:
         (x0, y0), (x1, y1) = hole.ends_m
         lines.append(f"  hole {hole.index}: ({x0:.2f}, {y0:.2f}) to ({x1:.2f}, {y1:.2f}) m, {hole.why}")

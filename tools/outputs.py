@@ -150,4 +150,5 @@ def _fill_facts(filled: Filled) -> dict[str, Json]:
         "cells": int(np.count_nonzero(cells)),
         "mean_certainty": mean,
         "open_ends": len(filled.open_ends_m),
+        "noise_ends": filled.noise_ends,
     }

@@ -80,6 +80,7 @@ def test_golden_bytes_of_several_arrays() -> None:
     assert frames[2:] == [b"\x01\0\0\0", b"\x02\0\0\0", b"\xcc", b"\0\0\0\0"]
     assert header["holes"][0]["curve"] == "chord"
     assert header["open_ends_m"] == [[1.0, 2.0]]
+    assert header["noise_ends"] == 0
 
 
 def test_the_other_topics_come_back_as_they_went() -> None:

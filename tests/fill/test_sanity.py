@@ -7,8 +7,10 @@ import pytest
 from numpy.typing import NDArray
 
 from config.schema import Fill
-from fill.closing import open_walls
+from fill.closing import left_open, open_walls
 from fill.filler import Filler
+from fill.memory import Memory
+from fill.segments import find_walls
 from fill.values import Filled
 from mapping.values import FREE, OCCUPIED, UNKNOWN, Grid
 
@@ -44,8 +46,46 @@ def test_of_noise_only_the_longest_walls_keep_their_ends() -> None:
     state = noise(400)
     ends = open_walls(state == OCCUPIED, state).ends
     assert len(ends) == 1500
-    fewer = open_walls(state[:200, :200] == OCCUPIED, state[:200, :200]).ends
-    assert 0 < len(fewer) < 1500
+    assert 0 < len(open_walls(state[:200, :200] == OCCUPIED, state[:200, :200]).ends) < 1500
+
+
+def tangle(side: int) -> NDArray[np.uint8]:
+    """Combs side by side, all joined: many tips, and no end of a wall."""
+    state = np.full((side, side), UNKNOWN, np.uint8)
+    state[4:-4, 4] = OCCUPIED
+    for spine in range(8, side - 8, 12):
+        state[spine, 4:-4] = OCCUPIED
+        state[spine - 4 : spine + 5, 7:-4:3] = OCCUPIED
+    return state
+
+
+def test_tips_of_a_tangle_are_noise_and_keep_to_their_walls() -> None:
+    state = tangle(160)
+    memory = Memory()
+    left = []
+    for rows, value in ((slice(158, 160), OCCUPIED), (slice(62, 76), FREE), (slice(0, 150), UNKNOWN)):
+        state[rows, 5:] = value
+        memory.begin()
+        walls = memory.walls(state == OCCUPIED, state)
+        anew = find_walls(state == OCCUPIED)
+        assert sorted(walls.tips[walls.noise].tolist()) == sorted(anew.tips[anew.noise].tolist())
+        left.append(int(walls.noise.sum()))
+    assert left[0] > left[1] > 1000
+    assert left[2] == 0
+
+
+def test_where_there_are_more_tips_than_any_site_has_memory_tells_the_same_as_scratch() -> None:
+    state = noise(400)
+    memory = Memory()
+    for _ in range(2):
+        memory.begin()
+        walls, anew = memory.walls(state == OCCUPIED, state), find_walls(state == OCCUPIED)
+        assert walls.noise.sum() == anew.noise.sum()
+        assert [(end.x, end.y) for end in walls.ends] == [(end.x, end.y) for end in anew.ends]
+        state[:, :60] = UNKNOWN
+    assert len(left_open(state, [])[0]) == 1500
+    assert left_open(state, [])[1] > 0
+    assert left_open(state[:200, :200], [])[1] == 0
 
 
 @pytest.mark.slow

@@ -32,6 +32,21 @@ def test_a_gap_is_filled_and_told(gap: Path, tmp_path: Path, capsys: pytest.Capt
     assert (filled.x0_m, filled.y0_m) == (1.0, -1.0)
 
 
+def test_noise_is_told_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    state = np.full((160, 160), UNKNOWN, np.uint8)
+    state[4:-4, 4] = OCCUPIED
+    for spine in range(8, 152, 12):  # combs, all joined: more tips than a wall has
+        state[spine, 4:-4] = OCCUPIED
+        state[spine - 4 : spine + 5, 7:-4:3] = OCCUPIED
+    grid = Grid(0.05, 0.0, 0.0, np.zeros(state.shape, np.float32), state)
+    write_map(tmp_path, "combs", grid, state_shades(state))
+    assert main(["fill", str(tmp_path / "combs.yaml"), "-o", str(tmp_path / "out")]) == 0
+    said = [line for line in capsys.readouterr().out.splitlines() if "they are noise" in line]
+    told = json.loads((tmp_path / "out" / "report.json").read_text())["fills"]
+    assert told["noise_ends"] > 0
+    assert [f"{told['noise_ends']} ends more" in line for line in said] == [True]
+
+
 def test_json_is_the_report(gap: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["fill", str(gap), "-o", str(tmp_path / "out"), "--json"]) == 0
     told = json.loads(capsys.readouterr().out)

@@ -114,7 +114,7 @@ def test_the_report_tells_counts_versions_and_digests(state: MapState, origin: P
     write_outputs(tmp_path, state, origin)
     told = json.loads((tmp_path / "report.json").read_text())
     assert told["stations"] == {"placed": 1, "doubtful": 1, "unplaced": 1}
-    assert told["fills"] == {"holes": 1, "cells": 6, "mean_certainty": 0.8, "open_ends": 1}
+    assert told["fills"] == {"holes": 1, "cells": 6, "mean_certainty": 0.8, "open_ends": 1, "noise_ends": 0}
     assert told["logs"] == ["dive-1.mcap"]
     assert told["damage"] == {"skipped_chunks": 2}
     assert told["config_hash"] == config_hash(Config())
