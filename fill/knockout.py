@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
+from fill.centre import STEPS
 from fill.freedom import at
-from fill.segments import EIGHT, STEPS, End, Walls, find_walls
+from fill.segments import EIGHT, End, Walls, find_walls
 from mapping.values import FREE, OCCUPIED, UNKNOWN
 
 SIZES: Final = (4, 7, 12, 20, 30)
