@@ -20,15 +20,14 @@ class Candidate:
     """A way to close a hole between two ``ends``, or, if it is a ``side``, an end and the side of a wall.
 
     ``path`` ``(n, 2)`` int32 of row and column, joined edge to edge from inside the one wall to inside the other;
-    ``cells`` the same as a set, ``way`` as it was drawn; ``features`` after ``FEATURES``; ``half_a``, ``half_b`` half
-    the thickness at either end; ``start`` and ``finish`` x and y of both ends, in cells; ``ends`` the two as they were
-    found, where a wall is met on its side the place that is met.
+    ``way`` as it was drawn; ``features`` after ``FEATURES``; ``half_a``, ``half_b`` half the thickness at either end;
+    ``start`` and ``finish`` x and y of both ends, in cells; ``ends`` the two as they were found, where a wall is met on
+    its side the place that is met.
     """
 
     curve: str
     path: NDArray[np.int32]
     way: Way
-    cells: frozenset[tuple[int, int]]
     gap: float
     features: NDArray[np.float64]
     half_a: float
@@ -71,7 +70,6 @@ def _candidate(way: Way, told: NDArray[np.float64]) -> Candidate:
         curve=way.curve.name,
         path=way.path,
         way=way,
-        cells=frozenset(map(tuple, way.path.tolist())),
         gap=way.chord.gap,
         features=told,
         half_a=a.half,

@@ -15,6 +15,7 @@ from fill.candidates import Candidate
 from fill.freedom import capped
 from fill.matching import asked, assign, candidates, gain
 from fill.memory import Memory
+from fill.recalling import chances_of
 from fill.segments import EIGHT, End, Walls
 from fill.settling import settled
 from mapping.trees import Trees
@@ -50,12 +51,10 @@ def close_holes(
     """Close the holes of ``state`` ``(rows, cols)`` up to ``longest`` cells; ``memory`` spares work done before."""
     memory = memory or Memory()
     wall = state == OCCUPIED
-    walls = open_walls(wall, state, memory)
     closed: list[Closed] = []
     for reach in _rounds(longest):
-        fresh = _close_round(candidates(walls, state, reach, memory), model, threshold, state, wall, memory)
-        walls = open_walls(wall, state, memory)
-        closed += fresh
+        found = candidates(open_walls(wall, state, memory), state, reach, memory)
+        closed += _close_round(found, model, threshold, state, wall, memory)
     return closed
 
 
@@ -102,14 +101,14 @@ def _close_round(
     """Take the best candidates, and mark their cells in ``wall``."""
     if not found:
         return []
-    chances = model.chance(np.stack([each.features for each in found]))
-    by_end = _by_end(found)
+    chances = chances_of(found, model, memory)
+    gains = [0.0] * len(found)  # what is less likely than the threshold is worth nothing
+    for index in np.flatnonzero(chances > threshold).tolist():
+        gains[index] = gain(float(chances[index]), asked(found[index], threshold)) - _ONE_END * found[index].side
+    taken = assign(found, gains)
+    by_end = _by_end(found, {end for index in taken for end in found[index].joined})
     closed: list[Closed] = []
-    gains = [
-        gain(chance, asked(each, threshold)) - _ONE_END * each.side
-        for chance, each in zip(chances.tolist(), found, strict=True)
-    ]
-    for index in assign(found, gains):
+    for index in taken:
         rivals = _rivals(index, found, by_end, chances)
         best = settled(found[index], state, memory)
         for cells, away in _stretches(best, state, wall, memory):
@@ -118,12 +117,13 @@ def _close_round(
     return closed
 
 
-def _by_end(found: list[Candidate]) -> dict[End, list[int]]:
-    """Return for each end the candidates that it has."""
-    indices: dict[End, list[int]] = {}
+def _by_end(found: list[Candidate], ends: set[End]) -> dict[End, list[int]]:
+    """Return for each of some ends the candidates that it has."""
+    indices: dict[End, list[int]] = {end: [] for end in ends}
     for index, each in enumerate(found):
         for end in each.joined:
-            indices.setdefault(end, []).append(index)
+            if end in ends:
+                indices[end].append(index)
     return indices
 
 

@@ -95,7 +95,9 @@ def bowed(curve: Curve, heights: NDArray[np.float64]) -> NDArray[np.float64]:
 def cells_of(points: NDArray[np.float64]) -> NDArray[np.int32]:
     """Cells ``(n, 2)`` of row and column that a curve passes, each once in a row."""
     cells: NDArray[np.int32] = cell_at(points[:, ::-1]).astype(np.int32)
-    fresh = np.concatenate([[True], np.any(cells[1:] != cells[:-1], axis=1)])
+    moved = cells[1:] != cells[:-1]
+    fresh = np.ones(len(cells), np.bool_)
+    fresh[1:] = moved[:, 0] | moved[:, 1]
     return np.asarray(cells[fresh], np.int32)
 
 
@@ -180,10 +182,14 @@ def _best_order(u: NDArray[np.float64], v: NDArray[np.float64]) -> tuple[int, ND
 
 def sampled(points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Resample a polyline at equal steps of a quarter cell."""
-    steps = np.hypot(*np.diff(points, axis=0).T)
-    length = np.concatenate([[0.0], np.cumsum(steps)])
+    steps = points[1:] - points[:-1]
+    length = np.zeros(len(points))
+    np.cumsum(np.hypot(steps[:, 0], steps[:, 1]), out=length[1:])
     at = np.linspace(0.0, length[-1], max(2, math.ceil(length[-1] / _STEP) + 1))
-    return np.stack([np.interp(at, length, points[:, axis]) for axis in (0, 1)], axis=1)
+    places = np.empty((len(at), 2))
+    for axis in (0, 1):
+        places[:, axis] = np.interp(at, length, points[:, axis])
+    return places
 
 
 def _wrapped(angle: float) -> float:

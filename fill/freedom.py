@@ -36,16 +36,21 @@ def clear_path(cells: NDArray[np.int32], state: NDArray[np.uint8]) -> NDArray[np
         return None
     if np.any(state[cells[:, 0], cells[:, 1]] == FREE):
         return None
-    slant = np.flatnonzero(np.all(cells[1:] != cells[:-1], axis=1))
+    moved = cells[1:] != cells[:-1]
+    slant = np.flatnonzero(moved[:, 0] & moved[:, 1])
     if not len(slant):
         return cells
-    first = np.stack([cells[slant, 0], cells[slant + 1, 1]], axis=1)
-    other = np.stack([cells[slant + 1, 0], cells[slant, 1]], axis=1)
-    shut = state[first[:, 0], first[:, 1]] == FREE
-    joint = np.where(shut[:, None], other, first)
-    if np.any(state[joint[:, 0], joint[:, 1]] == FREE):
+    (row, col), (next_row, next_col) = cells[slant].T, cells[slant + 1].T
+    shut = state[row, next_col] == FREE
+    joint_row, joint_col = np.where(shut, next_row, row), np.where(shut, col, next_col)
+    if np.any(state[joint_row, joint_col] == FREE):
         return None
-    return np.insert(cells, slant + 1, joint, axis=0)
+    joints = slant + 1 + np.arange(len(slant))
+    path = np.empty((len(cells) + len(slant), 2), np.int32)
+    given = np.ones(len(path), np.bool_)
+    given[joints] = False
+    path[given], path[joints, 0], path[joints, 1] = cells, joint_row, joint_col
+    return path
 
 
 _FAN: Final = np.array(

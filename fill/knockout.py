@@ -67,11 +67,13 @@ def places(centre: NDArray[np.bool_], corner: Cell) -> list[Place]:
     cells = np.argwhere(centre)
     numbers = _mixed(cells + corner)
     order = np.argsort(numbers, kind="stable")[:_TRIED]
-    taken: list[Cell] = []
+    tried = cells[order]
+    apart = np.abs(tried[:, None] - tried).max(axis=2, initial=0) >= _APART
+    taken: list[int] = []
     found = []
-    for (row, col), number in zip(cells[order].tolist(), numbers[order].tolist(), strict=True):
-        if all(max(abs(row - r), abs(col - c)) >= _APART for r, c in taken):
-            taken.append((row, col))
+    for index, ((row, col), number) in enumerate(zip(tried.tolist(), numbers[order].tolist(), strict=True)):
+        if apart[index, taken].all():
+            taken.append(index)
             size = SIZES[number % len(SIZES)]
             first = max(row - size // 2 - _ABOUT, 0), max(col - size // 2 - _ABOUT, 0)
             found.append(Place(*first, (row - first[0], col - first[1]), size, number))

@@ -85,19 +85,31 @@ def _pairs(walls: Walls, longest: float) -> list[tuple[int, int]]:
 
 def _rivals(live: Sequence[int], found: Sequence[Candidate]) -> dict[int, set[int]]:
     """Return for each candidate those that share an end or a cell with it."""
-    claims: dict[End | tuple[int, int], list[int]] = {}
-    for index in live:
-        each = found[index]
-        claimed: tuple[End | tuple[int, int], ...] = *each.cells, *each.joined
-        for claim in claimed:
-            claims.setdefault(claim, []).append(index)
     rivals: dict[int, set[int]] = {index: set() for index in live}
-    for claimants in {tuple(each) for each in claims.values() if len(each) > 1}:
+    if not rivals:
+        return rivals
+    by_end: dict[End, list[int]] = {}
+    for index in live:
+        for end in found[index].joined:
+            by_end.setdefault(end, []).append(index)
+    for claimants in {*map(tuple, by_end.values()), *_crossing(live, [found[index].path for index in live])}:
         for index in claimants:
             rivals[index].update(claimants)
     for index in live:
         rivals[index].discard(index)
     return rivals
+
+
+def _crossing(live: Sequence[int], paths: Sequence[NDArray[np.int32]]) -> set[tuple[int, ...]]:
+    """Return those of ``live`` that pass a cell together, for each such cell."""
+    rows, cols = np.concatenate(paths).astype(np.int64).T
+    owner = np.repeat(np.array(live, np.int64), [len(path) for path in paths])
+    claims = np.unique(np.stack([rows * (int(cols.max()) + 1) + cols, owner], axis=1), axis=0)
+    first = np.flatnonzero(np.diff(claims[:, 0], prepend=-1))
+    last = np.append(first[1:], len(claims))
+    several = last - first > 1
+    owners: list[int] = claims[:, 1].tolist()
+    return {tuple(owners[one:end]) for one, end in zip(first[several].tolist(), last[several].tolist(), strict=True)}
 
 
 def _group(start: int, rivals: dict[int, set[int]]) -> set[int]:

@@ -13,7 +13,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
-from typing import Final, TypeVar
+from itertools import compress, islice
+from typing import Final, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +28,9 @@ from mapping.values import FREE
 T = TypeVar("T")
 Box = tuple[int, int, int, int]
 """First row and column, and the row and column behind the last."""
+Layer = Literal["walls", "state", "water"]
 
+_NOWHERE: Final = (0, 0, 0, 0)
 _TILE: Final = 8  # cells: changes are noted by tiles of so many; as many as bytes in a number of 64 bits
 
 
@@ -44,6 +47,9 @@ class Basis:
     walls: bool = True
 
 
+Result = tuple[Basis, object]
+
+
 @dataclass(slots=True)
 class _Round:
     """What was known in one round: the layers that results were made from, and the results."""
@@ -51,7 +57,16 @@ class _Round:
     state: NDArray[np.uint8]
     water: NDArray[np.float64]
     found: Found
-    results: dict[Hashable, tuple[Basis, object]] = field(default_factory=dict)
+    results: dict[Hashable, Result] = field(default_factory=dict)
+    boxes: list[NDArray[np.int64]] = field(default_factory=list)
+
+    def bases(self) -> NDArray[np.int64]:
+        """Return ``(n, 9)`` what each result was made from: the boxes seen and wet, and whether walls count."""
+        known = sum(map(len, self.boxes))
+        fresh = [basis for basis, _ in islice(self.results.values(), known, None)]
+        rows = [(*basis.seen, *(basis.wet or _NOWHERE), basis.walls) for basis in fresh]
+        self.boxes = [np.concatenate([*self.boxes, np.array(rows, np.int64).reshape(-1, 9)])]
+        return self.boxes[0]
 
 
 class Memory:
@@ -62,7 +77,7 @@ class Memory:
         self._now: list[_Round] = []
         self._finder = Finder()
         self._recent = Recent()
-        self._before: list[tuple[_Round, _Changes]] = []
+        self._before: list[_Earlier] = []
 
     @property
     def measured(self) -> Walls:
@@ -89,7 +104,7 @@ class Memory:
             here = _Round(self._now[0].state, self._now[0].water, found)
         else:  # the caller may go on to draw in its state
             here = _Round(state.copy(), _water(state, before[0] if before else None), found)
-        self._before = [(each, _Changes(here, each)) for each in before]
+        self._before = [_Earlier(here, each) for each in before]
         self._now.append(here)
         return found.walls
 
@@ -126,41 +141,44 @@ class Memory:
         """Return what ``make`` would, which needs nothing but ``key``."""
         return self._recent.recall(key, make)
 
-    def _known_before(self, key: Hashable) -> tuple[Basis, object] | None:
+    def _known_before(self, key: Hashable) -> Result | None:
         """Return an earlier round's result that still holds."""
-        for before, changes in self._before:
-            known = before.results.get(key)
-            if known is not None and changes.spare(known[0]):
+        for before in self._before:
+            known = before.holding().get(key)
+            if known is not None:
                 return known
         return None
 
 
-class _Changes:
-    """What changed from one round to another."""
+class _Earlier:
+    """An earlier round, beside the present one."""
 
-    def __init__(self, now: _Round, before: _Round) -> None:
-        self._now, self._was = now, before
-        self._tables: dict[str, list[list[int]] | None] = {}
+    def __init__(self, now: _Round, was: _Round) -> None:
+        self._now, self._was = now, was
+        self._holding: dict[Hashable, Result] | None = None
 
-    def spare(self, basis: Basis) -> bool:
-        """Whether nothing changed of what a result was made from."""
-        if not self._clean("walls" if basis.walls else "state", basis.seen):
-            return False
-        return basis.wet is None or self._clean("water", basis.wet)
+    def holding(self) -> dict[Hashable, Result]:
+        """Return those of its results of whose bases nothing changed."""
+        if self._holding is None:
+            bases = self._was.bases()
+            seen, wet, walls = bases[:, :4], bases[:, 4:8], bases[:, 8] > 0
+            clean = np.where(walls, self._clean("walls", seen), self._clean("state", seen)) & self._clean("water", wet)
+            self._holding = dict(compress(self._was.results.items(), clean.tolist()))
+        return self._holding
 
-    def _clean(self, layer: str, box: Box) -> bool:
-        if layer not in self._tables:
-            self._tables[layer] = _table(self._changed(layer))
-        total = self._tables[layer]
-        if total is None:
-            return True
-        first, left = max(box[0], 0) // _TILE, max(box[1], 0) // _TILE
-        last, right = min((box[2] - 1) // _TILE + 1, len(total) - 1), min((box[3] - 1) // _TILE + 1, len(total[0]) - 1)
-        if last <= first or right <= left:
-            return True
-        return total[last][right] - total[first][right] - total[last][left] + total[first][left] == 0
+    def _clean(self, layer: Layer, boxes: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Tell for boxes ``(n, 4)`` whether nothing changed in them."""
+        changed = self._changed(layer)
+        if not changed.any():
+            return np.ones(len(boxes), np.bool_)
+        total = _table(changed)
+        most = np.array(total.shape) - 1
+        first = np.minimum(np.maximum(boxes[:, :2], 0) // _TILE, most)
+        last = np.maximum(np.minimum((boxes[:, 2:] - 1) // _TILE + 1, most), first)
+        (top, left), (bottom, right) = first.T, last.T
+        return np.asarray(total[bottom, right] - total[top, right] - total[bottom, left] + total[top, left] == 0)
 
-    def _changed(self, layer: str) -> NDArray[np.bool_]:
+    def _changed(self, layer: Layer) -> NDArray[np.bool_]:
         if layer == "water":
             return np.asarray(self._now.water != self._was.water, np.bool_)
         state = np.asarray(self._now.state != self._was.state, np.bool_)
@@ -172,17 +190,14 @@ class _Changes:
         return np.asarray(state | walls | (np.isin(now.walls.label, grew) if grew else False), np.bool_)
 
 
-def _table(changed: NDArray[np.bool_]) -> list[list[int]] | None:
-    """Sum up the changed tiles above and left of each; None where nothing changed."""
-    if not changed.any():
-        return None
+def _table(changed: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Sum up the changed tiles above and left of each."""
     high, wide = (-(-size // _TILE) for size in changed.shape)
     whole = np.zeros((high * _TILE, wide * _TILE), bool)
     whole[: changed.shape[0], : changed.shape[1]] = changed
     tiles = np.zeros((high + 1, wide + 1), np.int64)
     tiles[1:, 1:] = whole.view(np.uint64).reshape(high, _TILE, wide).any(axis=1)  # a row of a tile is one number
-    table: list[list[int]] = tiles.cumsum(axis=0).cumsum(axis=1).tolist()
-    return table
+    return tiles.cumsum(axis=0).cumsum(axis=1)
 
 
 def _water(state: NDArray[np.uint8], before: _Round | None) -> NDArray[np.float64]:

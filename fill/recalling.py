@@ -16,7 +16,9 @@ from fill.memory import Basis, Box, Memory
 from fill.scene import FARTHEST, Scene
 from fill.segments import End
 from fill.ways import Drawn, Way, across, onto_sides
+from mapping.trees import Trees
 
+_NOTHING: Final = Basis((0, 0, 0, 0), walls=False)  # but the key
 _FACE: Final = 4  # cells about the sides of a way, and one to round
 
 
@@ -39,6 +41,16 @@ def recalled(ways: Sequence[Way], closer: Sequence[float], scene: Scene, memory:
         return [(_judged_from(way), each) for way, each in zip(chosen, found, strict=True)]
 
     return memory.recall_all(list(zip(ways, closer, strict=True)), made)
+
+
+def chances_of(found: Sequence[Candidate], model: Trees, memory: Memory) -> NDArray[np.float64]:
+    """Chances ``(n,)`` of candidates, by the one model that this memory knows."""
+
+    def made(places: list[int]) -> list[tuple[Basis, float]]:
+        told = model.chance(np.stack([found[place].features for place in places]))
+        return [(_NOTHING, chance) for chance in told.tolist()]
+
+    return np.array(memory.recall_all([("chance", each) for each in found], made), np.float64)
 
 
 def _across(a: End, b: End, scene: Scene) -> tuple[Basis, list[Way]]:

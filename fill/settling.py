@@ -66,7 +66,7 @@ def settled(candidate: Candidate, state: State, memory: Memory) -> Candidate:
     path = memory.recall(("settled", candidate.way), made)
     if path is None:
         return candidate
-    return dataclasses.replace(candidate, path=path, cells=frozenset(map(tuple, path.tolist())))
+    return dataclasses.replace(candidate, path=path)
 
 
 def edge_way(candidate: Candidate, state: State, water: Layer) -> NDArray[np.int32] | None:
