@@ -205,6 +205,8 @@ def _limb(line: NDArray[np.float64]) -> int:
     """
     best, found = _CORNER, len(line)
     for last in range(_LIMB[0], min(_LIMB[1], len(line) - 4)):
+        if _turns_less(line, last, best):
+            continue
         out, before = line[0] - line[last], line[last] - line[min(last + _LIMB[1], len(line) - 1)]
         size = math.hypot(*out)
         aside = np.abs((line[: last + 1] - line[last]) @ (-out[1], out[0])) / size
@@ -212,6 +214,15 @@ def _limb(line: NDArray[np.float64]) -> int:
         if angle > best and aside.max() < _STRAIGHT:
             best, found = angle, last + 1
     return found
+
+
+def _turns_less(line: NDArray[np.float64], last: int, angle: float) -> bool:
+    """Whether a line surely turns by less than an angle at a place; plain numbers tell it in a tenth of the time."""
+    places: list[list[float]] = line[[0, last, min(last + _LIMB[1], len(line) - 1)]].tolist()
+    (x0, y0), (x1, y1), (x2, y2) = places
+    ahead_x, ahead_y, back_x, back_y = x0 - x1, y0 - y1, x1 - x2, y1 - y2
+    size = math.hypot(ahead_x, ahead_y) * math.hypot(back_x, back_y)
+    return ahead_x * back_x + ahead_y * back_y > (math.cos(angle) + 1e-9) * size
 
 
 def _bend(along: NDArray[np.float64], aside: NDArray[np.float64]) -> NDArray[np.float64] | None:

@@ -179,5 +179,12 @@ def _rivals_agree(closed: Closed) -> NDArray[np.float64]:
     total, shared = 0.0, np.zeros(len(closed.cells))
     for rival, chance in closed.rivals:
         total += chance
-        shared += chance * (cKDTree(rival.path).query(closed.cells)[0] <= _SAME)
+        shared += chance * _passed(rival.path, closed.cells)
     return shared / total if total > 0.0 else np.ones(len(closed.cells))
+
+
+def _passed(path: NDArray[np.int32], cells: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """Whether each cell ``(n,)`` is one of a path or close to one; both are so short that a tree costs more."""
+    rows, cols = path.T
+    apart = (cells[:, :1] - rows) ** 2 + (cells[:, 1:] - cols) ** 2
+    return np.asarray(apart.min(axis=1) <= _SAME**2, np.bool_)
