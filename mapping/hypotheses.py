@@ -21,7 +21,7 @@ from mapping.modes import local_moments, pose_of
 from mapping.pieces import Pieces, sd_m
 from mapping.prior import Prior
 from mapping.search import search
-from mapping.signs import overlap
+from mapping.signs import MOST_BEHIND, behind, overlap
 from mapping.values import Pose
 from mapping.view import View
 
@@ -48,7 +48,7 @@ class Fit:
     """Where the leading scan of a piece lies in another piece: ``covariance`` ``(3, 3)`` over x_m, y_m, heading_rad.
 
     ``height`` is the log-posterior, ``margin`` the same above the best pose elsewhere; ``witnesses`` of its scans lie
-    on known walls.
+    on known walls, and no scan has more than the share ``behind`` of its points on walls seen from their other side.
     """
 
     pose: Pose
@@ -56,12 +56,14 @@ class Fit:
     height: float
     margin: float
     witnesses: int
+    behind: float = 0.0
 
     @property
     def is_sure(self) -> bool:
         """Tell whether the pieces may be joined."""
         needed = ACCEPT_MARGIN if self.witnesses >= WITNESSES else LONE_MARGIN
-        return self.margin >= needed and self.witnesses > 0 and sd_m(self.covariance) <= ACCEPT_SD_M
+        possible = self.witnesses > 0 and self.behind <= MOST_BEHIND
+        return possible and self.margin >= needed and sd_m(self.covariance) <= ACCEPT_SD_M
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +115,8 @@ def lies(
     if other_height > height:
         best, height, other_height = other, other_height, height
     mean, covariance = local_moments(like, best)
-    found = Fit(pose_of(mean), covariance, height, height - other_height, sum(_is_witness(e, best) for e in asked))
+    witnesses, most_behind = sum(_is_witness(each, best) for each in asked), max(_behind(each, best) for each in asked)
+    found = Fit(pose_of(mean), covariance, height, height - other_height, witnesses, most_behind)
     sight = pieces.sight(lead)
     alone = charts.alone(sight, base, prior)
     first, _ = search(alone, prior, particles, rng, np.zeros((0, 3)))
@@ -134,6 +137,10 @@ def _is_witness(each: _Asked, pose: Floats) -> bool:
     carried = _carried(pose[None, :], each.seen)
     fits = float(each.like.score(carried)[0]) >= ACCEPT_FIT
     return fits and overlap(each.view, each.reference, carried[0]) >= ACCEPT_OVERLAP
+
+
+def _behind(each: _Asked, pose: Floats) -> float:
+    return behind(each.view, each.reference, _carried(pose[None, :], each.seen)[0])
 
 
 def _carried(poses: Floats, seen: Pose) -> Floats:

@@ -111,7 +111,8 @@ class _Side:
             self._spread[step] = self._every(step)
         xy1, weight, n = self._spread[step]
         cell = self._cells(to_x, to_y, xy1)
-        told = rough.take(cell[:, :n]) @ weight[:n] + plain.take(cell[:, n:]) @ weight[n:]
+        with np.errstate(invalid="ignore"):  # some builds of BLAS raise the flag for what lies behind an array's end
+            told = rough.take(cell[:, :n]) @ weight[:n] + plain.take(cell[:, n:]) @ weight[n:]
         return np.asarray(told, dtype=np.float32)
 
     def signs(self, to_x: Floats, to_y: Floats) -> tuple[Floats, Floats]:

@@ -18,6 +18,7 @@ from mapping.hypotheses import lies
 from mapping.pieces import SURE_M, Pieces, sd_m
 from mapping.prior import Cloud, Floats, Prior
 from mapping.register import Match, register
+from mapping.signs import MOST_BEHIND
 from mapping.values import Pose
 from mapping.verdict import ACCEPT, ACCEPT_SD_M, ASTRAY, LEAST_MARGIN
 
@@ -58,7 +59,7 @@ def closing(pieces: Pieces, charts: Charts, other: int, config: Map) -> Closing 
 
 def is_sure(match: Match) -> bool:
     """Tell whether walls at the beginning of a loop are the same as at its end, where the chain says that they are."""
-    clear = match.margin >= LEAST_MARGIN and match.odds >= ACCEPT
+    clear = match.margin >= LEAST_MARGIN and match.odds >= ACCEPT and match.behind <= MOST_BEHIND
     return clear and sd_m(match.covariance) <= ACCEPT_SD_M and match.astray <= ASTRAY
 
 

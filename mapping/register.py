@@ -18,7 +18,7 @@ from mapping.likelihood import Likelihood
 from mapping.modes import ELSEWHERE_M, Mode, Ridge, is_elsewhere, mode_at, pose_of, ridge_of
 from mapping.prior import Prior
 from mapping.search import NOWHERE, search
-from mapping.signs import odds_of, overlap, signs_of, weakest_direction
+from mapping.signs import behind, odds_of, overlap, signs_of, weakest_direction
 from mapping.values import Pose
 from mapping.view import View
 
@@ -43,8 +43,9 @@ class Match:
     ``odds`` are the log-odds that it is right.  ``overlap`` is the share of the scan's weight that lies on known walls;
     ``weak_rad`` the direction (clockwise from north, in [0, pi)) in which the walls hold it least, and ``hold`` the
     information there, 0 to 0.5 of the whole.  ``astray`` tells how many standard deviations the pose is from the
-    prior's cloud, 0 without one.  ``height`` is the log-posterior, ``fit`` the same per independent point, ``other``
-    the best pose elsewhere, which may be higher: then the margin is negative.
+    prior's cloud, 0 without one.  ``height`` is the log-posterior, ``fit`` the same per independent point, ``behind``
+    the share of the scan's points on walls that the reference saw from their other side, and ``other`` the best pose
+    elsewhere, which may be higher: then the margin is negative.
 
     ``ridge`` tells that the posterior is one long mode: the pose is its mean, the covariance covers its length, and
     ``margin`` and ``other`` are of poses off the ridge.
@@ -59,6 +60,7 @@ class Match:
     hold: float
     height: float
     fit: float
+    behind: float
     other: Pose
     astray: float
     ridge: bool
@@ -133,6 +135,7 @@ def _told(
         hold=hold,
         height=mode.height,
         fit=float(like.score(mode.pose[None, :])[0]),
+        behind=behind(scan, reference, mode.pose),
         other=pose_of(other.pose),
         astray=prior.astray(mean),
         ridge=ridge is not None,

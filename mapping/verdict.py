@@ -10,6 +10,7 @@ from config.schema import Map
 from mapping.led import LED_FIT, LED_MARGIN, LED_OVERLAP, WAY_FIT, WAY_OVERLAP, WAY_SD_M, walked
 from mapping.prior import Cloud, Prior
 from mapping.register import Match
+from mapping.signs import MOST_BEHIND
 from mapping.values import Pose, Scan, Station, Status
 
 ACCEPT = 3.7
@@ -45,10 +46,11 @@ def judge(scan: Scan, match: Match, piece: int, prior: Prior, *, chained: bool) 
     """
     sd_m = _sd_m(match)
     fits = match.margin >= LEAST_MARGIN and match.odds >= _needed(match, prior, piece, chained=chained)
-    sure = is_led(match) if prior.is_led else fits
+    possible = match.behind <= MOST_BEHIND
+    sure = possible and (is_led(match) if prior.is_led else fits)
     status: Status = "placed"
     if not sure or sd_m > ACCEPT_SD_M or match.astray > ASTRAY:
-        if prior.cloud is not None and is_seen(match, prior.cloud):
+        if possible and prior.cloud is not None and is_seen(match, prior.cloud):
             put = walked(match, prior.cloud, 1.0 / (1.0 + math.exp(-match.odds)))
             return Station(scan, put.pose, put.covariance, "placed", piece, match.margin, _why_walked(put))
         status, piece = "doubtful" if match.margin >= DOUBT_MARGIN else "unplaced", scan.index + 1
@@ -105,6 +107,8 @@ def _why(status: Status, match: Match, sd_m: float) -> str:
         return f"could slide along {weak} degrees / {weak + 180} degrees: {fits}; take a scan nearer to the last one"
     if match.astray > ASTRAY:
         return f"the way there led elsewhere, {fits}: take a scan nearer to the last one, or give a hint"
+    if match.behind > MOST_BEHIND:
+        return f"fits only where it would see known walls from behind, {fits}: take a scan nearer to the last one"
     if match.overlap < BAD_OVERLAP or match.fit < BAD_FIT:
         return f"fits badly, {fits}: take a scan nearer to the last one"
     return f"fits nearly as well elsewhere: {fits}; take a scan nearer to the last one, or give a hint"

@@ -87,7 +87,7 @@ def test_ways_are_joined_and_turned_into_the_map() -> None:
 
 MATCH = Match(
     pose=Pose(1.8, 0.3, 1.0), covariance=np.diag([0.04, 0.0004, 0.001]), margin=9.0, odds=1.1, overlap=0.6,
-    weak_rad=math.pi / 2, hold=0.02, height=1.0, fit=0.7, other=Pose(0, 0, 0), astray=1.0, ridge=False,
+    weak_rad=math.pi / 2, hold=0.02, height=1.0, fit=0.7, behind=0.0, other=Pose(0, 0, 0), astray=1.0, ridge=False,
 )  # fmt: skip
 PRIOR = Prior(2.4, 0.0, 0.12, 1.0, 0.07, gaussian=True)
 

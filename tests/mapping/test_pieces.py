@@ -142,6 +142,7 @@ def test_pieces_are_joined_by_two_witnesses_or_by_one_that_is_very_sure() -> Non
     assert not replace(fit, witnesses=1).is_sure
     assert replace(fit, witnesses=1, margin=19.0).is_sure
     assert not replace(fit, witnesses=0, margin=40.0).is_sure, "none of its scans lies on known walls"
+    assert not replace(fit, margin=40.0, behind=0.2).is_sure, "it would have seen walls from behind"
     assert not replace(fit, margin=11.0).is_sure
     assert not replace(fit, covariance=100.0 * DOUBT).is_sure
 

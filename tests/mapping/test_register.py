@@ -183,6 +183,16 @@ def test_a_scan_that_fits_best_where_the_one_before_was_made_needs_more() -> Non
     assert judge(scan.scan, match, 0, there, chained=True).status == "placed"
 
 
+def test_no_odds_place_a_scan_that_would_have_seen_walls_from_behind() -> None:
+    scan = seen(KEYHOLE, 0.3, 0.2, 0.1, seed=2)
+    match = replace(matched(scan, seen(KEYHOLE, 0.0, 0.0, 0.0)), odds=9.0)
+    way = Prior(-1.5, 0.0, 3.0, 0.1, 0.1)
+    assert judge(scan.scan, match, 0, way, chained=True).status == "placed"
+    station = judge(scan.scan, replace(match, behind=0.25), 0, way, chained=True)
+    assert (station.status, station.piece) == ("doubtful", scan.scan.index + 1)
+    assert "from behind" in station.why
+
+
 def test_a_scan_of_few_points_says_little() -> None:
     whole = seen(KEYHOLE, 0.3, 0.2, 0.0, seed=2)
     heard = np.arange(200) < 60

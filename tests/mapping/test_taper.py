@@ -28,7 +28,7 @@ def sight(walls: np.ndarray, x_m: float, y_m: float) -> Sight:
 
 
 def match_at(pose: Pose, height: float) -> Match:
-    return Match(pose, 0.01 * np.eye(3), 20.0, 5.0, 1.0, 0.0, 0.5, height, 1.5, Pose(9.0, 9.0, 0.0), 0.0, False)
+    return Match(pose, 0.01 * np.eye(3), 20.0, 5.0, 1.0, 0.0, 0.5, height, 1.5, 0.0, Pose(9.0, 9.0, 0.0), 0.0, False)
 
 
 def test_the_axis_is_the_middle_of_the_open_water() -> None:
