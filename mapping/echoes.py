@@ -35,8 +35,6 @@ WIDE_M: Final = 0.35
 OWN: Final = 0.9
 """An echo that side lobes of a louder one beside it explain nearly (``mapping.clutter``) may be no wall: a doorway's
 edges close it with rings."""
-LOUDEST_M: Final = 0.1
-"""An echo is loudest no farther than this behind its first strong peak."""
 SHORT_M: Final = 0.3
 SHORT_RAD: Final = math.radians(45.0)
 """A wall of which less than this is seen without a break, in length and in angle, is no wall."""
@@ -59,16 +57,14 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True)
 class Beams:
-    """A scan's beams in order of bearing: ``echoes`` without ringing, ``excess`` above all that is no wall.
+    """A scan's beams in order of bearing: ``echoes`` without ringing, and ``excess`` above all that is no wall.
 
-    ``smooth`` are the echoes smoothed along the range.
     ``own`` ``(n, bins)`` is less than 1 where side lobes may explain an echo, and ``ended`` ``(n, bins)`` is ``excess``
     less what the beam keeps up behind (``mapping.clutter``).
     """
 
     bearing_rad: Floats
     echoes: Floats
-    smooth: Floats
     excess: Floats
     own: Floats
     ended: Floats
@@ -150,9 +146,7 @@ def beams_of(scan: Scan, order: NDArray[np.intp], config: Map, *, closed: bool) 
     ended = np.minimum(excess, np.maximum(excess - lasting(smooth, floor, scan.bin_m), 0.0))
     bearing, deaf = scan.bearing_rad[order], deaf_m(raw, scan.bin_m)
     width, height = math.radians(config.beam_deg) / 2.0, math.radians(config.beam_vertical_deg) / 2.0
-    return Beams(
-        bearing, echoes, smooth, excess, own, ended, floor, scan.bin_m, scan.step_rad, closed, width, height, deaf
-    )
+    return Beams(bearing, echoes, excess, own, ended, floor, scan.bin_m, scan.step_rad, closed, width, height, deaf)
 
 
 def peaks_along(beams: Beams) -> Peaks:
@@ -203,15 +197,8 @@ def judge(beams: Beams, at: NDArray[np.intp], range_m: Floats, joined: Flags, la
 
 
 def of_lobes(beams: Beams, at: NDArray[np.intp]) -> Flags:
-    """Whether side lobes explain the echoes at the bins ``at``, ``(n,)``; within the ringing nothing tells.
-
-    They are asked where the echo is loudest: its leading edge, a bin or two before, they do not reach.
-    """
-    behind = np.arange(-1, max(1, round(LOUDEST_M / beams.bin_m)) + 1)
-    near = np.clip(at[:, None] + behind, 0, beams.echoes.shape[1] - 1)
-    rows = np.arange(len(at))
-    loudest = near[rows, np.take_along_axis(beams.smooth, near, axis=1).argmax(axis=1)]
-    return np.asarray((beams.own[rows, loudest] < OWN) & ((at + 0.5) * beams.bin_m > beams.deaf_m))
+    """Whether side lobes explain the echoes at the bins ``at``, ``(n,)``; within the ringing nothing tells."""
+    return np.asarray((beams.own[np.arange(len(at)), at] < OWN) & ((at + 0.5) * beams.bin_m > beams.deaf_m))
 
 
 def middle_of_five(level: Floats) -> Floats:
