@@ -20,8 +20,8 @@ from mapping.view import View, to_map
 FACE_M = 0.25
 """Water is looked for so far from a wall, on its either side."""
 MOST_BEHIND: Final = 0.15
-"""A scan of which more lies on walls whose water is on their other side was made elsewhere; of true places of stations
-and pieces of two real logs none had more than 0.08."""
+"""A scan of which more lies on walls whose water is on their other side was made elsewhere; of pieces that were tried
+at their true places in two real logs none had more than 0.08."""
 MOST: Final = 40.0
 """A lead of more makes nothing surer."""
 LEAST_SD_M, LEAST_HEIGHT = 0.02, 3.0
