@@ -63,6 +63,19 @@ def window(a: End, b: End, gap: float, shape: tuple[int, ...]) -> tuple[NDArray[
 
 def _way(cost: Layer, a: End, b: End, low: NDArray[np.int64]) -> Layer | None:
     """Points ``(n, 2)`` of x and y on the cheapest way from end to end; costs below 0 forbid a cell."""
+    cells = cheapest(cost, a, b, low)
+    if cells is None:
+        return None
+    way = cells[:, ::-1].astype(np.float64)
+    way[0], way[-1] = (a.x, a.y), (b.x, b.y)
+    return way
+
+
+def cheapest(cost: Layer, a: End, b: End, low: NDArray[np.int64]) -> NDArray[np.int64] | None:
+    """Cells ``(n, 2)`` of the cheapest way from end to end through a window whose first cell is ``low``.
+
+    Costs below 0 forbid a cell; None where no way leads through.
+    """
     first, last = (
         tuple(np.clip(cell_at(np.array([end.y, end.x])) - low, 0, np.array(cost.shape) - 1).tolist()) for end in (a, b)
     )
@@ -72,9 +85,7 @@ def _way(cost: Layer, a: End, b: End, low: NDArray[np.int64]) -> Layer | None:
     total, _ = search.find_costs([first], [last])
     if not np.isfinite(total[last]):
         return None
-    way = (np.array(search.traceback(last), np.float64) + low)[:, ::-1].copy()
-    way[0], way[-1] = (a.x, a.y), (b.x, b.y)
-    return way
+    return np.array(search.traceback(last), np.int64) + low
 
 
 def _smooth(way: Layer) -> Layer:

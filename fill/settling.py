@@ -15,11 +15,10 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from skimage.graph import MCP_Geometric
 from skimage.measure import approximate_polygon
 
 from fill.candidates import Candidate
-from fill.channels import window
+from fill.channels import cheapest, window
 from fill.freedom import at, clear_path
 from fill.memory import Basis, Box, Memory
 from fill.segments import End, cell_at
@@ -132,16 +131,8 @@ def _hugging(ends: tuple[End, End], deep: float, state: State, water: Layer) -> 
     here = water[low[0] : high[0], low[1] : high[1]]
     off = np.minimum(np.maximum(np.abs(here - deep) - _EVEN, 0.0), _MOST)
     cost = np.where(here <= 0.0, -1.0, 1.0 + _PRICE * off)
-    first, last = (
-        tuple(np.clip(cell_at(np.array([end.y, end.x])) - low, 0, np.array(cost.shape) - 1).tolist()) for end in ends
-    )
-    if cost[first] < 0.0 or cost[last] < 0.0:
-        return None
-    search = MCP_Geometric(cost)
-    total, _ = search.find_costs([first], [last])
-    if not np.isfinite(total[last]):
-        return None
-    path = clear_path((np.array(search.traceback(last)) + low).astype(np.int32), state)
+    found = cheapest(cost, a, b, low)
+    path = None if found is None else clear_path(found.astype(np.int32), state)
     if path is None or len(path) > _LONGEST * gap + _LONGER:
         return None
     rows, cols = path.T
